@@ -103,8 +103,7 @@ class ModelPlant : public Plant<Real> {
   bool matrices(int lane_, const Real *q, double *M, double *K, double *D) override {
     const int n = this->n;
     const std::size_t size = std::size_t(n);
-    std::vector<Real> all(size * size);
-    std::vector<Vec3<Real>> wrench(size);
+    all.assign(size * size, Real(0.0)), wrench.resize(size);
     mass_matrix(model, work, q, zero.data(), wrench.data(), all.data());
     for (std::size_t i = 0; i < size * size; ++i) M[i] = lane(all[i], lane_), K[i] = D[i] = 0.0;
     if (model.mass_damped) {
@@ -180,6 +179,8 @@ class ModelPlant : public Plant<Real> {
   const Model<Real> &model;
   Workspace<Real> &work;
   std::vector<Real> x, rest, force, zero, reaction;
+  std::vector<Real> all;  // scratch of `matrices`: (n, n)
+  std::vector<Vec3<Real>> wrench;
 
   // Accelerations under n forces at rest, without K q.
   void pull(const Real *q, const Real *forces_, const PassInputs<Real> &pass, Real *a) {

@@ -123,27 +123,23 @@ inline void row_product(int n, const double *x, int step, const double *B, int e
   }
 }
 
-// A B.
-inline std::vector<double> product(int n, const std::vector<double> &A,
-                                   const std::vector<double> &B) {
-  std::vector<double> out(A.size());
+// A B into `out`.
+inline void product(int n, const std::vector<double> &A, const std::vector<double> &B,
+                    std::vector<double> &out) {
   for (int i = 0; i < n; ++i)
     row_product(n, A.data() + std::ptrdiff_t(i) * n, 1, B.data(), n,
                 out.data() + std::ptrdiff_t(i) * n);
-  return out;
 }
 
-// S^T B, which is known to be symmetric.
-inline std::vector<double> symmetric_product(int n, const std::vector<double> &S,
-                                             const std::vector<double> &B) {
-  std::vector<double> out(S.size());
+// S^T B, which is known to be symmetric, into `out`.
+inline void symmetric_product(int n, const std::vector<double> &S, const std::vector<double> &B,
+                              std::vector<double> &out) {
   for (int a = 0; a < n; ++a)
     row_product(n, S.data() + a, n, B.data(), a + 1, out.data() + std::ptrdiff_t(a) * n);
   for (int a = 0; a < n; ++a)
     for (int b = 0; b < a; ++b)
       out[std::size_t(b) * std::size_t(n) + std::size_t(a)] =
           out[std::size_t(a) * std::size_t(n) + std::size_t(b)];
-  return out;
 }
 
 }  // namespace flexura

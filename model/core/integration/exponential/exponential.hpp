@@ -35,6 +35,7 @@ class Exponential : public Method<Real> {
         tight(slides(shared.plant) ? SLIDING * TIGHT : TIGHT),
         n(shared.n),
         modes(n),
+        matrices(n),
         steps(modes, extras_of(shared)),
         within(steps),
         accounts(steps, within, free_joints(shared)) {
@@ -183,6 +184,7 @@ class Exponential : public Method<Real> {
   const double tight;  // TIGHT, or more
   const int n;
   ModalBasis<Real> modes;
+  Matrices matrices;  // where modes were looked at last
   ExponentialAdams<Real> steps;
   DenseOutput<Real> within;
   EnergyIntegrals<Real> accounts;
@@ -366,7 +368,7 @@ class Exponential : public Method<Real> {
   // Takes robot k's modes at q if they are poor there; true if so. The cutoff is found once, at the
   // start.
   bool take_modes(int k, const Real *q, const Real *v, double t) {
-    Matrices m(n);
+    Matrices &m = matrices;
     if (!c.plant.matrices(k, q, m.M.data(), m.K.data(), m.D.data()))
       matrices_by_passes(c.plant, k, q, m), c.passes += n + 1;
     for (int i = 0; i < c.plant.joints; ++i) {

@@ -62,6 +62,9 @@ class ModalBasis {
       for (Real **matrix : {&phi, &rows}) take_(*matrix, n * stride);
       for (Real **vector : {&w2, &own, &material, &d2, &lag, &seen}) take_(*vector, stride);
     });
+    for (auto *matrix : {&old, &half, &turned_M, &turned_K, &shapes, &momenta, &lost})
+      matrix->resize(Matrices::square(n));
+    squares.resize(std::size_t(n));
     for (int k = 0; k < LANES; ++k)
       cutoff[k] = std::numeric_limits<double>::infinity(), taken[k] = 0, patience[k] = TURN,
       gone[k] = 0.0;
@@ -96,7 +99,7 @@ class ModalBasis {
   bool take(int k, const Matrices &m, const Real *q, const bool *held_row, double slow,
             double zeta) {
     for (int i = 0; i < n; ++i) set_lane(seen[i], k, lane(q[i], k));
-    std::vector<double> M = m.M, K = m.K, D = m.D;
+    M = m.M, K = m.K, D = m.D;
     for (int i = 0; i < n; ++i) K[at(i, i)] += m.joint_stiffness[std::size_t(i)];
     for (int e = 0; e < n; ++e) {
       if (!held_row[e]) continue;
@@ -105,28 +108,25 @@ class ModalBasis {
       M[at(e, e)] = 1.0;
     }
     gone[k] += patience[k];
-    std::vector<double> shapes(M.size()), old,
-        squares(std::size_t(n), 0.0);  // shapes: a row an unknown, a column a mode
     if (taken[k] > 0) {
-      old.resize(M.size());
       for (int mode = 0; mode < n; ++mode)
         for (int i = 0; i < n; ++i) old[at(i, mode)] = lane(phi[mode * stride + i], k);
-      const std::vector<double> turned_M = symmetric_product(n, old, product(n, M, old)),
-                                turned_K = symmetric_product(n, old, product(n, K, old));
+      product(n, M, old, half), symmetric_product(n, old, half, turned_M);
+      product(n, K, old, half), symmetric_product(n, old, half, turned_K);
       const double changed = change(k, turned_M, turned_K, slow) / POOR;
       patience[k] = smaller(larger(0.7 * gone[k] * (1.0 / root(larger(changed, 1e-3)) - 1.0), TURN),
                             FAR * TURN);  // were it to grow as a square
       if (changed < 1.0) return false;
       eigen_pencil(n, turned_K.data(), turned_M.data(), squares.data(),
-                   shapes.data());  // nearly diagonal: soon done
-      shapes = product(n, old, shapes);
+                   half.data());  // nearly diagonal: soon done
+      product(n, old, half, shapes);
     } else {
       eigen_pencil(n, K.data(), M.data(), squares.data(), shapes.data());
     }
     gone[k] = 0.0, patience[k] = TURN;
     const bool loses = std::any_of(D.begin(), D.end(), [](double x) { return x != 0.0; });
-    const std::vector<double> momenta = product(n, M, shapes),
-                              lost = loses ? product(n, D, shapes) : D;
+    product(n, M, shapes, momenta), lost = D;
+    if (loses) product(n, D, shapes, lost);
     const double least = larger(FREE, 1e-14 * squares[std::size_t(n - 1)]);
     for (int mode = 0; mode < n; ++mode) {
       const double square = squares[std::size_t(mode)];
@@ -165,6 +165,8 @@ class ModalBasis {
   Real *seen;  // (stride) the configuration looked at last
   double patience[LANES],
       gone[LANES];  // way to the next look; from where the modes were taken to the last one
+  // Scratch of `take`: (n, n), but for squares (n).
+  std::vector<double> M, K, D, old, half, turned_M, turned_K, shapes, momenta, lost, squares;
 
   std::size_t at(int i, int j) const { return std::size_t(i) * std::size_t(n) + std::size_t(j); }
 
