@@ -46,7 +46,7 @@ HOST = {
     "link": {
         "frames.py": ["test_board_frames.py", "test_board_link.py"],
         "round_trip.py": ["test_round_trip.py"],
-        "session.py": ["test_board_link.py", "test_round_trip.py", "test_commissioning.py"],
+        "session.py": ["test_session.py", "test_board_link.py", "test_commissioning.py"],
     }
 }
 NAMES = [*BOARD, *HOST]
