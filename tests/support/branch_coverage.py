@@ -7,9 +7,10 @@ How branches are counted, where g++ compiles without optimization:
   out.
 - A line without a word of the language that decides has none: what gcov finds there is the
   compiler's own, as a test whether memory is to be given back.
-- gcov gives a line once for each function and instance of a template that it is in. A branch is
+- gcov gives a line once for each function and instance of a template that it is in, or once with
+  the branches of all instances, one instance after the other, and without a function. A branch is
   taken if it is taken in one of them. Instances with as many branches as each other are added up;
-  where the compiler left some out, what it kept counts by itself.
+  where the compiler left some out, what it kept counts by itself, if it was ever entered.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 DECIDES = re.compile(
-    r"\b(if|for|while|case|switch|default)\b|\?|&&|\|\||\b[A-Z_]{3,}\("
-)  # or a macro
+    r"\b(if|for|while|case|switch|default(?=:))\b|\?|&&|\|\||\b(?!MODULE)[A-Z_]{3,}\("
+)  # or a macro, but for what the binding library makes of a module; "= default" decides nothing
 
 
 class Line(NamedTuple):
@@ -62,6 +63,24 @@ def decisions(found: list[dict]) -> list[int]:
     return out
 
 
+def placed(line: dict, functions: list[dict]) -> tuple[str, list[int]]:
+    """The function of a line, and how often its branches were taken, instances added up."""
+    taken = decisions(line["branches"])
+    if "function_name" in line:
+        same = [one for one in functions if one["name"] == line["function_name"]]
+        return function_name(same[0]["demangled_name"]), taken
+    number = line["line_number"]
+    around = [one for one in functions if one["start_line"] <= number <= one["end_line"]]
+    if not around:
+        return "", taken
+    innermost = max(one["start_line"] for one in around)
+    instances = [one for one in around if one["start_line"] == innermost]
+    each, rest = divmod(len(taken), len(instances))
+    if not rest:
+        taken = [sum(taken[k::each]) for k in range(each)]
+    return function_name(instances[0]["demangled_name"]), taken
+
+
 def reported(objects: Path) -> list[dict]:
     """What gcov says of each file of each object below a folder, in JSON."""
     found = sorted(objects.rglob("*.gcda"))
@@ -89,18 +108,20 @@ def branches(objects: Path, sources: Path) -> dict[Line, list[int]]:
         name = str(path.relative_to(sources))
         if name not in texts:
             texts[name] = path.read_text(encoding="utf-8").splitlines()
-        names = {one["name"]: function_name(one["demangled_name"]) for one in file["functions"]}
         for line in file["lines"]:
             number = line["line_number"]
-            taken = decisions(line["branches"])
+            function, taken = placed(line, file["functions"])
             if not taken or not DECIDES.search(texts[name][number - 1].split("//")[0]):
                 continue
-            by_size = counts[name, number, names.get(line.get("function_name", ""), "")]
+            by_size = counts[name, number, function]
             before = by_size.get(len(taken), [0] * len(taken))
             by_size[len(taken)] = [a + b for a, b in zip(before, taken, strict=True)]
     return {
         Line(name, number, function, texts[name][number - 1].strip()): [
-            count for _, taken in sorted(by_size.items()) for count in taken
+            count
+            for _, taken in sorted(by_size.items())
+            if any(taken) or not any(map(any, by_size.values()))
+            for count in taken
         ]
         for (name, number, function), by_size in sorted(counts.items())
     }
