@@ -493,3 +493,38 @@ TEST("a pack gives each robot the digits that it has alone") {
     }
   }
 }
+
+TEST("masses of a pack whose stages are refused at walls have the digits of each alone") {
+  std::vector<Inputs> acting(4, Inputs(1));
+  Inputs *list[4];
+  for (int k = 0; k < 4; ++k) {
+    acting[std::size_t(k)].joints[0].force = {segment(0.0, 1.0 + 0.3 * k)};
+    list[k] = &acting[std::size_t(k)];
+    if (k == 2) continue;  // one has no wall
+    acting[std::size_t(k)].function = [k](double, const double *q, const double *v, double *force) {
+      const double deep = q[0] - 0.1 * (k + 1);
+      if (deep > 0.0) force[0] = -1e7 * deep * deep - 1e5 * deep * v[0];
+    };
+  }
+  Masses<Pack<4>> four(1);
+  four.coulomb = {0.1};
+  Loop<Pack<4>> loop(four, list, grid(0.0, 2.0, 11), 1e-3);
+  Implicit<Pack<4>> method(loop.integration);
+  const Pack<4> still[1] = {0.0};
+  loop.start(still, still, 0.1);
+  while (loop.advance(method, 100)) {
+  }
+  for (int k = 0; k < 4; ++k) {
+    Masses<double> plant(1);
+    plant.coulomb = {0.1};
+    Run run(plant, list[k], grid(0.0, 2.0, 11), 1e-3, true);
+    CHECK(run({0.0}, {0.0}, 0.1) == Status::done);
+    const RunState &alone = run.loop.run_state[0], &packed = loop.run_state[std::size_t(k)];
+    CHECK(alone.steps == packed.steps && alone.rejected == packed.rejected);
+    bool same = true;
+    for (std::size_t j = 0; j < std::size_t(11 * run.record().size); ++j)
+      same = same && check::same_bits(run.record().state[j], loop.record[std::size_t(k)].state[j]);
+    CHECK(same);
+    CHECK((run.at(10, 0) > 1.0) == (k == 2));
+  }
+}
