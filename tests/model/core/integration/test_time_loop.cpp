@@ -528,3 +528,116 @@ TEST("masses of a pack whose stages are refused at walls have the digits of each
     CHECK((run.at(10, 0) > 1.0) == (k == 2));
   }
 }
+
+TEST("a budget that a rejected step uses up, or the last step of a run") {
+  Masses<double> plant(1);
+  plant.stiffness = {1e4};
+  Inputs acting(1);
+  Run rejected(plant, acting, grid(0.0, 1.0, 3), 1e-6, true);
+  rejected.loop.most_steps = 1;
+  CHECK(rejected({1.0}, {0.0}, 0.9) == Status::exhausted);
+  CHECK(rejected.loop.run_state[0].rejected == 1 && rejected.loop.run_state[0].t == 0.0);
+  Run whole(plant, acting, grid(0.0, 1.0, 3), 1e-6, true);
+  CHECK(whole({1.0}, {0.0}) == Status::done);
+  const RunState &took = whole.loop.run_state[0];
+  Run exact(plant, acting, grid(0.0, 1.0, 3), 1e-6, true);
+  exact.loop.most_steps = took.steps + took.rejected;
+  CHECK(exact({1.0}, {0.0}) == Status::exhausted);
+  CHECK(exact.loop.run_state[0].t == 1.0 && exact.record().rows == 3);
+  CHECK(exact.record().state == whole.record().state);
+}
+
+TEST("a joint that leaves from its limit stays there; a run that goes on has the row of a limit") {
+  Masses<double> plant(1);
+  Inputs acting(1);
+  acting.high[0] = 0.2;
+  Run there(plant, acting, grid(0.0, 1.0, 3), 1e-6, false);
+  CHECK(there({0.2}, {1.0}) == Status::limit);
+  CHECK(there.loop.run_state[0].t == 0.0 && there.record().rows == 1 && there.at(0, 0) == 0.2);
+  Run later(plant, acting, {0.0, 0.1}, 1e-6, false);
+  CHECK(later({0.0}, {1.0}) == Status::done);
+  later.loop.go_on(1.0, 1.0, false);
+  while (later.loop.advance(*later.method, 100)) {
+  }
+  CHECK(later.loop.run_state[0].status == Status::limit && later.record().rows == 1);
+  CHECK_NEAR(later.record().t[0], 0.2, 1e-12);
+  CHECK_NEAR(later.at(0, 0), 0.2, 1e-12);
+}
+
+TEST("a pack that is stopped keeps the robots that ended; its slowest robot is its progress") {
+  std::vector<Inputs> acting(4, Inputs(1));
+  Inputs *list[4];
+  for (int k = 0; k < 4; ++k) {
+    acting[std::size_t(k)].joints[0].force = {segment(0.0, 1.0 + k)};
+    list[k] = &acting[std::size_t(k)];
+  }
+  acting[3].high[0] = 0.02;  // met at 0.1 s
+  Masses<Pack<4>> four(1);
+  std::atomic<bool> stop{false};
+  std::atomic<double> reached{-1.0};
+  Loop<Pack<4>> loop(four, list, grid(0.0, 10.0, 11), 1e-6);
+  loop.longest = 0.05, loop.interrupt = &stop, loop.progress = &reached;
+  Explicit<Pack<4>> method(loop.integration);
+  const Pack<4> still[1] = {0.0};
+  loop.start(still, still, 1e-3);
+  while (loop.run_state[3].running()) loop.advance(method, 1);
+  loop.rehearsal = true;
+  CHECK(loop.advance(method, 20));
+  loop.rehearsal = false;
+  double slowest = 10.0;
+  for (int k = 0; k < 3; ++k) slowest = std::fmin(slowest, loop.run_state[std::size_t(k)].t);
+  CHECK(reached == slowest && slowest > 0.1);
+  stop = true;
+  CHECK(!loop.advance(method, 20));
+  CHECK(loop.run_state[3].status == Status::limit);
+  CHECK_NEAR(loop.run_state[3].t, 0.1, 1e-9);
+  for (std::size_t k = 0; k < 3; ++k) CHECK(loop.run_state[k].status == Status::interrupted);
+}
+
+TEST("a joint on its motion: Coulomb friction is the drive's, a locked one does not follow") {
+  for (bool implicit : {false, true}) {
+    Masses<double> plant(2);
+    plant.coulomb = {0.4, 0.0}, plant.locked[1] = true;
+    Inputs acting(2);
+    for (JointDrive &drive : acting.joints)
+      drive.motion = {segment(0.0, 0.0, 0.5)}, drive.prescribed = true;
+    Run run(plant, acting, grid(0.0, 1.0, 5), 1e-7, implicit);
+    CHECK(run({0.0, 0.3}, {0.5, 0.0}) == Status::done);
+    for (int k = 0; k < 5; ++k) {
+      CHECK_NEAR(run.at(k, 0), 0.125 * k, 1e-15);
+      CHECK_NEAR(run.drive(k, 0), 0.4, 1e-12);
+      CHECK(run.at(k, 1) == 0.3 && run.at(k, 3) == 0.0);
+    }
+    CHECK_NEAR(run.account(4, LOSS), 0.2, 1e-9);
+  }
+}
+
+TEST("steps of a pair in a pack have the digits of each robot alone, where each has breaks") {
+  std::vector<Inputs> acting(4, Inputs(1));
+  Inputs *list[4];
+  for (int k = 0; k < 4; ++k) {
+    acting[std::size_t(k)].joints[0].force = {segment(0.0, 1.0), segment(0.2 + 0.1 * k, -1.0)};
+    list[k] = &acting[std::size_t(k)];
+  }
+  for (const EmbeddedPair *pair : {&PAIR_3, &PAIR_5}) {
+    Masses<Pack<4>> four(1, 1);
+    four.stiffness = {4.0, 90.0};
+    Loop<Pack<4>> loop(four, list, grid(0.0, 1.0, 6), 1e-6);
+    EmbeddedPairSteps<Pack<4>> method(loop.integration, *pair);
+    const Pack<4> q[2] = {0.1, 0.1}, v[2] = {0.0, 0.0};
+    loop.start(q, v, 1e-3);
+    while (loop.advance(method, 100)) {
+    }
+    for (int k = 0; k < 4; ++k) {
+      Masses<double> plant(1, 1);
+      plant.stiffness = {4.0, 90.0};
+      Run run(plant, list[k], grid(0.0, 1.0, 6), 1e-6, false);
+      run.method = std::make_unique<EmbeddedPairSteps<double>>(run.loop.integration, *pair);
+      CHECK(run({0.1, 0.1}, {0.0, 0.0}) == Status::done);
+      bool same = run.record().rows == 6 && loop.record[std::size_t(k)].rows == 6;
+      for (std::size_t j = 0; same && j < std::size_t(6 * run.record().size); ++j)
+        same = check::same_bits(run.record().state[j], loop.record[std::size_t(k)].state[j]);
+      CHECK(same);
+    }
+  }
+}
