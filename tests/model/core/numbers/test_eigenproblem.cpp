@@ -209,3 +209,13 @@ TEST("triangles: A = L L^T, solves, a semidefinite matrix, one that is not defin
   Numbers N = {1, 2, 2, 3};
   CHECK(cholesky(2, N.data()) < 0.0);
 }
+
+TEST("a pencil whose diagonal hides that it is indefinite: exact squares") {
+  for (double off : {10.0, 1e3, 1e6}) {
+    const Numbers K{1.0, off, off, 1.0}, M{1.0, 0.0, 0.0, 1.0};
+    Numbers squares(2), shapes(4);
+    CHECK(eigen_pencil(2, K.data(), M.data(), squares.data(), shapes.data()) == 2);
+    CHECK_NEAR(squares[0], 1.0 - off, 1e-9 * off);
+    CHECK_NEAR(squares[1], 1.0 + off, 1e-9 * off);
+  }
+}
