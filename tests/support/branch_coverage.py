@@ -7,10 +7,10 @@ How branches are counted, where g++ compiles without optimization:
   out.
 - A line without a word of the language that decides has none: what gcov finds there is the
   compiler's own, as a test whether memory is to be given back.
-- gcov gives a line once for each function and instance of a template that it is in, or once with
-  the branches of all instances, one instance after the other, and without a function. A branch is
-  taken if it is taken in one of them. Instances with as many branches as each other are added up;
-  where the compiler left some out, what it kept counts by itself, if it was ever entered.
+- gcov gives a line once for each function and instance of a template that it is in; a line of a
+  lambda once, the branches of all instances one after the other. A branch is taken if it is taken
+  in one of them. Instances with as many branches as each other are added up; where the compiler
+  left some out, what it kept counts by itself, if it was ever entered.
 """
 
 from __future__ import annotations
@@ -64,21 +64,22 @@ def decisions(found: list[dict]) -> list[int]:
 
 
 def placed(line: dict, functions: list[dict]) -> tuple[str, list[int]]:
-    """The function of a line, and how often its branches were taken, instances added up."""
+    """The function of a line, and how often its branches were taken, instances added up.
+
+    Where gcov names no function the line is in a lambda, the last that begins before. "": gcov
+    tells nothing but the lambda.
+    """
     taken = decisions(line["branches"])
+    names = {one["name"]: one["demangled_name"] for one in functions}
     if "function_name" in line:
-        same = [one for one in functions if one["name"] == line["function_name"]]
-        return function_name(same[0]["demangled_name"]), taken
-    number = line["line_number"]
-    around = [one for one in functions if one["start_line"] <= number <= one["end_line"]]
-    if not around:
-        return "", taken
-    innermost = max(one["start_line"] for one in around)
-    instances = [one for one in around if one["start_line"] == innermost]
-    each, rest = divmod(len(taken), len(instances))
+        return function_name(names[line["function_name"]]), taken
+    begun = sorted((one["start_line"], one["name"]) for one in functions)
+    begun = [one for one in begun if one[0] <= line["line_number"]]
+    each, rest = divmod(len(taken), sum(start == begun[-1][0] for start, _ in begun))
     if not rest:
         taken = [sum(taken[k::each]) for k in range(each)]
-    return function_name(instances[0]["demangled_name"]), taken
+    around = [names[name] for _, name in begun if not re.search(r"\{lambda|^_Z", names[name])]
+    return function_name(around[-1]) if around else "", taken
 
 
 def reported(objects: Path) -> list[dict]:
@@ -116,6 +117,12 @@ def branches(objects: Path, sources: Path) -> dict[Line, list[int]]:
             by_size = counts[name, number, function]
             before = by_size.get(len(taken), [0] * len(taken))
             by_size[len(taken)] = [a + b for a, b in zip(before, taken, strict=True)]
+    for name, number, function in list(counts):
+        named = [key for key in counts if key[:2] == (name, number) and key[2]]
+        if not function and named:
+            for size, taken in counts.pop((name, number, "")).items():
+                before = counts[named[0]].get(size, [0] * size)
+                counts[named[0]][size] = [a + b for a, b in zip(before, taken, strict=True)]
     return {
         Line(name, number, function, texts[name][number - 1].strip()): [
             count

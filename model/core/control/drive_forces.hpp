@@ -192,7 +192,7 @@ class DriveForces {
   bool follows(int i) const {
     return of[0]->joints[i].prescribed && of[0]->joints[i].follows() && !plant.locked[i];
   }
-  bool has_coulomb(int i) const { return worst(plant.coulomb[i]) > 0.0 && !held[i]; }
+  bool has_coulomb(int i) const { return worst(plant.coulomb[i]) > 0.0; }
   Real constant(int i) const {
     return steady[i] + applied[i] + gains[2 * i] * set_point[i] +
            gains[2 * i + 1] * set_point_rate[i];

@@ -80,6 +80,16 @@ TEST("a joint that moves no mass, or one that is not finite, is refused; a locke
   CHECK(refused(robot) == "");
 }
 
+TEST("an infinite hub is refused, whatever its joint") {
+  for (JointKind kind : {JointKind::revolute, JointKind::slider}) {
+    Robot robot = of({rigid(0.2, 1.0)});
+    robot.links[0].joint.kind = kind;
+    CHECK(refused(robot) == "");
+    robot.links[0].joint.hub_mass = robot.links[0].joint.hub_inertia = INFINITE;
+    CHECK(refused(robot) == "0 joint");
+  }
+}
+
 TEST("beyond a transmission there must be a mass") {
   Robot robot = of({rigid(0.3, 0.0)});
   robot.links[0].joint.has_hub = robot.links[0].joint.elastic = true;

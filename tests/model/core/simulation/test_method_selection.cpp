@@ -192,6 +192,18 @@ TEST("under a controller: by its ticks, the robot's frequencies, dampers and the
   }
 }
 
+TEST("under a controller: sharp tolerances of stiff robots, rigid ones with a damper") {
+  Held held;
+  Inputs acting(1);
+  acting.sampler = &held, acting.rate_Hz = 10.0;
+  Masses<double> stiff = sprung(1e14), rigid(1);
+  rigid.stiffness = {1e4}, rigid.viscous[0] = 0.1;
+  CHECK(ended(stiff, acting, 1e-4, 1e-10).name == "explicit");
+  const Ended run = ended(rigid, acting, 1.0, 1e-5);
+  CHECK(run.name == "explicit-3");
+  CHECK_NEAR(run.place, 0.1 * std::exp(-0.05) * std::cos(100.0), 1e-3);
+}
+
 TEST("several steps of order 2 a tick are left to order 4") {
   Masses<double> plant = sprung(1e8, 2e3);
   Held held;
@@ -243,7 +255,14 @@ TEST("where exponential steps get stuck implicit ones begin, again or where it i
 }
 
 TEST("forces that no method can follow, at once: stuck whatever the tolerance") {
-  for (double rtol : {1e-4, 1e-10})
+  for (double rtol : {1e-4, 1e-10}) {
+    Masses<double> plant = sprung(1e6);
+    Inputs acting(1);
+    acting.function = [](double, const double *q, const double *, double *out) {
+      out[0] = 1.0 / std::pow(0.11 - q[0], 3);
+    };
+    const Ended steep = ended(plant, acting, 10.0, rtol);
+    CHECK(steep.state.status == Status::stuck && steep.place < 0.11);
     for (double force : {1e200, 1e308}) {
       Masses<double> plant = sprung(1e14);
       Inputs acting(1);
@@ -251,6 +270,7 @@ TEST("forces that no method can follow, at once: stuck whatever the tolerance") 
       const Ended run = ended(plant, acting, 1.0, rtol);
       CHECK(run.state.status == Status::stuck || run.state.status == Status::diverged);
     }
+  }
 }
 
 namespace {
@@ -274,10 +294,10 @@ struct Stopping : Masses<double> {
 
 TEST("a run that is stopped anywhere, in a comparison too, is stopped") {
   double before = 0.0;
-  for (long after = 10; after < 4000; after += 37) {
+  for (long after = 10; after < 6000; after += 47) {
     Stopping plant(after);
     Inputs acting(2);
-    acting.joints[0].force = {constant(0.0, 1.0), constant(0.7, -1.0)};
+    acting.joints[0].force = {{0.0, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, 1.0, 9.0, 0.0}};
     const Ended run = ended(plant, acting, 1e5, 1e-6, &plant.stop, 100000);
     CHECK(run.state.status == Status::interrupted && run.state.t < 1e5);
     before = std::fmax(before, run.state.t);
@@ -296,6 +316,11 @@ TEST("a limit that is met in a comparison ends the run") {
       const Ended run = ended(plant, acting, 1000.0, 1e-6);
       CHECK(run.state.status == Status::limit && run.state.joint == 0);
       CHECK_NEAR(run.state.t, at, 1e-5);
+      Masses<double> stiff = sprung(1e14);  // without exponential steps
+      stiff.stiffness[0] = 0.0;
+      const Ended sharp = ended(stiff, acting, 1000.0, 1e-10);
+      CHECK(sharp.state.status == Status::limit && sharp.name == "implicit");
+      CHECK_NEAR(sharp.state.t, at, 3e-9);  // limits are wider by 1e-9 m
     }
 }
 
