@@ -297,3 +297,17 @@ TEST("a strip drawn far: the first integral of the elastica, at any force") {
     CHECK_NEAR(found.tip.t, 0.5 * pi, 1e-3);
   }
 }
+
+TEST(
+    "a load that takes many Newton steps: what is found is in balance, a search from there stays") {
+  const Model<double> model = cantilever(4);
+  TipLoad load;
+  load.force[1] = 1e5, load.moment = 50.0;
+  Numbers q(model.n, 0.0);
+  const Equilibrium found = equilibrium(model, q.data(), load);
+  CHECK(found.balance == Balance::stable && found.sweeps > 20);
+  const Numbers there = q;
+  const Equilibrium again = equilibrium(model, q.data(), load);
+  CHECK(again.balance == Balance::stable && again.sweeps <= 2);
+  for (std::size_t i = 0; i < q.size(); ++i) CHECK_NEAR(q[i], there[i], 1e-9);
+}
