@@ -25,8 +25,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 DECIDES = re.compile(
-    r"\b(if|for|while|case|switch|default(?=:))\b|\?|&&|\|\||\b(?!MODULE)[A-Z_]{3,}\("
-)  # or a macro, but for what the binding library makes of a module; "= default" decides nothing
+    r"\b(if|for|while|case|switch|default)\b|\?|&&|\|\||\b(?!MODULE)[A-Z_]{3,}\("
+)  # or a macro, but for what the binding library makes of a module
 
 
 class Line(NamedTuple):
@@ -75,7 +75,8 @@ def placed(line: dict, functions: list[dict]) -> tuple[str, list[int]]:
         return function_name(names[line["function_name"]]), taken
     begun = sorted((one["start_line"], one["name"]) for one in functions)
     begun = [one for one in begun if one[0] <= line["line_number"]]
-    each, rest = divmod(len(taken), sum(start == begun[-1][0] for start, _ in begun))
+    instances = sum(start == begun[-1][0] for start, _ in begun)
+    each, rest = divmod(len(taken), max(instances, 1))
     if not rest:
         taken = [sum(taken[k::each]) for k in range(each)]
     around = [names[name] for _, name in begun if not re.search(r"\{lambda|^_Z", names[name])]
@@ -112,7 +113,8 @@ def branches(objects: Path, sources: Path) -> dict[Line, list[int]]:
         for line in file["lines"]:
             number = line["line_number"]
             function, taken = placed(line, file["functions"])
-            if not taken or not DECIDES.search(texts[name][number - 1].split("//")[0]):
+            text = texts[name][number - 1].split("//")[0]
+            if not taken or not DECIDES.search(text) or "= default;" in text:
                 continue
             by_size = counts[name, number, function]
             before = by_size.get(len(taken), [0] * len(taken))

@@ -138,7 +138,7 @@ TEST("robots of unlike spaces of modes are assembled together with the numbers o
 TEST("elements end at lumps as long as there are elements; a lump without a node weighs as much") {
   for (int elements : {1, 2, 3, 6}) {
     Robot robot = of({strip(0.6, elements)});
-    robot.links[0].lumps = {{0.2, 0.1, 0.0}, {0.4, 0.3, 0.0}};
+    robot.links[0].lumps = {{0.2, 0.1, 0.0}, {0.205, 0.05, 0.0}, {0.4, 0.3, 0.0}};
     const Model<double> model = assemble(robot);
     CHECK(model.n == 1 + 2 * elements);
     double mass = 0.0, ends = 0.0, lumps = 0;
@@ -146,7 +146,7 @@ TEST("elements end at lumps as long as there are elements; a lump without a node
       mass += piece.mass, ends += piece.length;
       for (const Lump &lump : robot.links[0].lumps) lumps += std::fabs(ends - lump.at) < 1e-12;
     }
-    CHECK_NEAR(mass, 0.6 * 0.2 + 0.4, 1e-12);
+    CHECK_NEAR(mass, 0.6 * 0.2 + 0.45, 1e-12);
     CHECK_NEAR(ends, 0.6, 1e-15);
     CHECK(lumps == std::min(2, elements - 1));
   }

@@ -50,13 +50,13 @@ struct Ended {
   double place;  // of the first joint
 };
 Ended ended(Plant<double> &plant, Inputs &acting, double end, double rtol,
-            const std::atomic<bool> *stop = nullptr, long some = 1000) {
+            const std::atomic<bool> *stop = nullptr, long some = 1000, double first = 1e-4) {
   Inputs *all[1] = {&acting};
   Loop<double> loop(plant, all, grid(end, 5), rtol);
   loop.interrupt = stop;
   std::vector<double> q(std::size_t(plant.n), 0.0), v(std::size_t(plant.n), 0.0);
   for (int i = 0; i < plant.joints; ++i) q[std::size_t(plant.first[std::size_t(i)])] = 0.1;
-  loop.start(q.data(), v.data(), 1e-4 * end);
+  loop.start(q.data(), v.data(), first * end);
   MethodSelection selection(loop, rtol);
   CHECK(std::string(selection.name()) == "auto");
   while (selection.advance(some)) {
@@ -263,6 +263,10 @@ TEST("a limit that is met in a comparison ends the run") {
       const Ended sharp = ended(stiff, acting, 1000.0, 1e-10);
       CHECK(sharp.state.status == Status::limit && sharp.name == "implicit");
       CHECK_NEAR(sharp.state.t, at, 3e-9);  // limits are wider by 1e-9 m
+      acting.limit(0, -1e9, 1e9);           // the run's end, as soon
+      const Ended done = ended(stiff, acting, at, 1e-10, nullptr, 1000, 0.5);
+      CHECK(done.state.status == Status::done && done.name == "implicit");
+      CHECK_NEAR(done.place, 0.1 - 0.5 * at * at, 1e-9);
     }
 }
 

@@ -378,3 +378,17 @@ TEST("robots that get stuck or diverge in a pack end as they do alone") {
         CHECK(out.endings[1].reached >= at - 1e-9 && out.endings[1].reached < at + 0.05);
       }
 }
+
+TEST("a robot that gets stuck at a force without bound leaves its neighbours in a pack alone") {
+  const Many many(4, 2);
+  Population population = many.population("implicit", 1e-5);
+  Inputs steep = population.drives[0];
+  steep.function = [](double, const double *q, const double *, double *force) {
+    force[0] = 1.0 / std::pow(0.01 - q[0], 3);
+  };
+  population.drives.push_back(steep), population.drive_of = {0, 1, 0, 1};
+  check_alone(many, population);
+  const Results out = results(population, 1);
+  CHECK(out.endings[0].status == Status::done && out.endings[1].status == Status::stuck);
+  CHECK(out.endings[1].position[0] < 0.01);
+}
