@@ -7,9 +7,10 @@ How branches are counted, where g++ compiles without optimization:
   out.
 - A line without a word of the language that decides has none: what gcov finds there is the
   compiler's own, as a test whether memory is to be given back.
-- gcov gives a line once for each function and instance of a template that it is in. A branch is
-  taken if it is taken in one of them. Instances with as many branches as each other are added up;
-  where the compiler left some out, what it kept counts by itself.
+- gcov gives a line once for each function and instance of a template that it is in; a line of a
+  lambda once, the branches of all instances one after the other. A branch is taken if it is taken
+  in one of them. Instances with as many branches as each other are added up; where the compiler
+  left some out, what it kept counts by itself, if it was ever entered.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 DECIDES = re.compile(
-    r"\b(if|for|while|case|switch|default)\b|\?|&&|\|\||\b[A-Z_]{3,}\("
-)  # or a macro
+    r"\b(if|for|while|case|switch|default)\b|\?|&&|\|\||\b(?!MODULE)[A-Z_]{3,}\("
+)  # or a macro, but for what the binding library makes of a module
 
 
 class Line(NamedTuple):
@@ -62,6 +63,26 @@ def decisions(found: list[dict]) -> list[int]:
     return out
 
 
+def placed(line: dict, functions: list[dict]) -> tuple[str, list[int]]:
+    """The function of a line, and how often its branches were taken, instances added up.
+
+    Where gcov names no function the line is in a lambda, the last that begins before. "": gcov
+    tells nothing but the lambda.
+    """
+    taken = decisions(line["branches"])
+    names = {one["name"]: one["demangled_name"] for one in functions}
+    if "function_name" in line:
+        return function_name(names[line["function_name"]]), taken
+    begun = sorted((one["start_line"], one["name"]) for one in functions)
+    begun = [one for one in begun if one[0] <= line["line_number"]]
+    instances = sum(start == begun[-1][0] for start, _ in begun)
+    each, rest = divmod(len(taken), max(instances, 1))
+    if not rest:
+        taken = [sum(taken[k::each]) for k in range(each)]
+    around = [names[name] for _, name in begun if not re.search(r"\{lambda|^_Z", names[name])]
+    return function_name(around[-1]) if around else "", taken
+
+
 def reported(objects: Path) -> list[dict]:
     """What gcov says of each file of each object below a folder, in JSON."""
     found = sorted(objects.rglob("*.gcda"))
@@ -89,18 +110,27 @@ def branches(objects: Path, sources: Path) -> dict[Line, list[int]]:
         name = str(path.relative_to(sources))
         if name not in texts:
             texts[name] = path.read_text(encoding="utf-8").splitlines()
-        names = {one["name"]: function_name(one["demangled_name"]) for one in file["functions"]}
         for line in file["lines"]:
             number = line["line_number"]
-            taken = decisions(line["branches"])
-            if not taken or not DECIDES.search(texts[name][number - 1].split("//")[0]):
+            function, taken = placed(line, file["functions"])
+            text = texts[name][number - 1].split("//")[0]
+            if not taken or not DECIDES.search(text) or "= default;" in text:
                 continue
-            by_size = counts[name, number, names.get(line.get("function_name", ""), "")]
+            by_size = counts[name, number, function]
             before = by_size.get(len(taken), [0] * len(taken))
             by_size[len(taken)] = [a + b for a, b in zip(before, taken, strict=True)]
+    for name, number, function in list(counts):
+        named = [key for key in counts if key[:2] == (name, number) and key[2]]
+        if not function and named:
+            for size, taken in counts.pop((name, number, "")).items():
+                before = counts[named[0]].get(size, [0] * size)
+                counts[named[0]][size] = [a + b for a, b in zip(before, taken, strict=True)]
     return {
         Line(name, number, function, texts[name][number - 1].strip()): [
-            count for _, taken in sorted(by_size.items()) for count in taken
+            count
+            for _, taken in sorted(by_size.items())
+            if any(taken) or not any(map(any, by_size.values()))
+            for count in taken
         ]
         for (name, number, function), by_size in sorted(counts.items())
     }

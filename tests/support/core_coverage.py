@@ -30,6 +30,7 @@ CMAKE, NINJA = Path(cmake.CMAKE_BIN_DIR) / "cmake", Path(ninja.BIN_DIR) / "ninja
 # Tests in Python that take what the C++ tests do not: the bindings, and runs of whole robots.
 PYTHON = [
     "tests/model/control/test_backlash.py",
+    "tests/model/control/test_controller.py",
     "tests/model/control/test_gain_sweep_under_loads.py",
     "tests/model/control/test_references.py",
     "tests/model/core/test_bindings.py",
@@ -39,6 +40,7 @@ PYTHON = [
     "tests/model/simulation/test_loads.py",
     "tests/model/simulation/test_method_choice.py",
     "tests/model/simulation/test_run_ends.py",
+    "tests/model/system/test_core.py",
     "tests/model/system/test_one_link.py",
     "tests/model/system/test_sleeves.py",
     "tests/model/system/test_statespace.py",

@@ -86,11 +86,12 @@ class DriveForces {
     }
   }
 
-  // The forces of a pass of an implicit stage whose last iterate is (q, v): Coulomb friction is
-  // taken as linear in the speed to come, by the tangent where the speed has settled to a fraction
-  // of v0 between iterates, else by the line through zero, which never overshoots.
-  void load_stage(const Real *q, const Real *v, bool first) {
-    call(q, v);
+  // The forces of a pass of an implicit stage whose last iterate is (q, v), the stages of robots
+  // `which` being open: Coulomb friction is taken as linear in the speed to come, by the tangent
+  // where the speed has settled to a fraction of v0 between iterates, else by the line through
+  // zero, which never overshoots.
+  void load_stage(const Real &which, const Real *q, const Real *v, bool first) {
+    call(q, v, which);
     put_loads(q);
     for (int i = 0; i < plant.joints; ++i) {
       if (held[i]) continue;
@@ -191,7 +192,7 @@ class DriveForces {
   bool follows(int i) const {
     return of[0]->joints[i].prescribed && of[0]->joints[i].follows() && !plant.locked[i];
   }
-  bool has_coulomb(int i) const { return worst(plant.coulomb[i]) > 0.0 && !held[i]; }
+  bool has_coulomb(int i) const { return worst(plant.coulomb[i]) > 0.0; }
   Real constant(int i) const {
     return steady[i] + applied[i] + gains[2 * i] * set_point[i] +
            gains[2 * i + 1] * set_point_rate[i];
@@ -209,12 +210,12 @@ class DriveForces {
     force = loads;
   }
 
-  // The caller's functions at (q, v).
-  void call(const Real *q, const Real *v) {
+  // The caller's functions at (q, v), of the robots `which`; the others keep their forces.
+  void call(const Real *q, const Real *v, const Real &which = Real(1.0)) {
     if (!calls) return;
     double *place_ = scratch.data(), *rate_ = place_ + plant.n, *out = rate_ + plant.n;
     for (int k = 0; k < LANES; ++k) {
-      if (!of[k]->function) continue;
+      if (!of[k]->function || lane(which, k) == 0.0) continue;
       for (int j = 0; j < plant.n; ++j) place_[j] = lane(q[j], k), rate_[j] = lane(v[j], k);
       for (int i = 0; i < plant.joints; ++i) out[i] = 0.0;
       of[k]->function(lane(time, k), place_, rate_, out);

@@ -284,7 +284,7 @@ class ModelPlant : public Plant<Real> {
       const Piece<Real> &rail = model.pieces[i - 1];
       const bool both = rail.joint == HubJoint::sleeve && !model.locked[std::size_t(rail.link)] &&
                         !model.locked[std::size_t(c.link)];
-      this->rides = this->rides || both;
+      this->rides |= both;
       this->travel[std::size_t(c.link)] = 0.003 * model.pieces[i - 1].length;
     }
   }

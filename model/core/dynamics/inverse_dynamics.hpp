@@ -97,13 +97,12 @@ Vec3<Real> inertial_sleeve(const Piece<Real> &c, const PieceState<Real> &k, cons
 }
 
 // The n forces of a motion (59): M a + h(q, v), plus what `terms` names of stiffness, damping and
-// (taken off) gravity. With v = 0 and no terms: M times a vector. `moved`: outward_kinematics was
-// called at (y, v) already.
+// (taken off) gravity. With v = 0 and no terms: M times a vector.
 template <class Real>
 void forces(const Model<Real> &model, Workspace<Real> &work, const Real *y, const Real *v,
-            const Real *a, const Terms &terms, Real *out, bool moved = false) {
+            const Real *a, const Terms &terms, Real *out) {
   const std::size_t count = model.pieces.size();
-  if (!moved) outward_kinematics(model, work, y, v);
+  outward_kinematics(model, work, y, v);
   const Real weight = terms.gravity ? 1.0 : 0.0;
   Vec3<Real> u{-weight * model.gravity[0], -weight * model.gravity[1], 0.0};
   std::vector<Vec3<Real>> &wrench = work.wrenches;
@@ -158,7 +157,7 @@ void forces(const Model<Real> &model, Workspace<Real> &work, const Real *y, cons
                                   const Held<Real> &, Real *);                                    \
   EXTERN template void add_mass_damping(const Model<Real> &, const Real *, const Real *, Real *); \
   EXTERN template void forces(const Model<Real> &, Workspace<Real> &, const Real *, const Real *, \
-                              const Real *, const Terms &, Real *, bool);
+                              const Real *, const Terms &, Real *);
 FLEXURA_SWEEPS(extern, double)
 FLEXURA_SWEEPS(extern, Pack<4>)
 FLEXURA_SWEEPS(extern, Dual<4>)

@@ -35,8 +35,7 @@ class JointLimits {
     if (limited() && turns())
       for (int j = 1; j < 8; ++j) look(step.begin + (step.end - step.begin) * j / 8.0);
     else if (limited())
-      for (const double *t = step.output; t < step.outputs_end && *t < step.end; ++t)
-        if (*t > inside) look(*t);
+      for (const double *t = step.output; t < step.outputs_end && *t < step.end; ++t) look(*t);
     look(step.end);
     if (outside == RunState::NEVER) return outside;
     while (outside - inside > 1e-13 * (step.end - step.begin)) {

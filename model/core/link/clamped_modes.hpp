@@ -95,16 +95,16 @@ ClampedModes<Real> orthogonal_shapes(const ClampedLink<Real> &link) {
   return out;
 }
 
-// The lowest `wanted` modes. If another link follows, the static shapes of a force and a moment at
-// the tip come to them.
+// The `lowest` modes, of fewer than there are. If another link follows, the static shapes of a
+// force and a moment at the tip come to them.
 template <class Real>
-ClampedModes<Real> clamped_modes(const ClampedLink<Real> &link, int wanted, bool follower) {
-  const int m = link.m, lowest = wanted > m ? m : wanted;
+ClampedModes<Real> clamped_modes(const ClampedLink<Real> &link, int lowest, bool follower) {
+  const int m = link.m;
   ClampedModes<Real> out;
   std::vector<Real> squares(std::size_t(m), Real(0.0)), all(std::size_t(m * m), Real(0.0));
   eigen_definite(m, link.K.data(), link.M.data(), squares.data(), all.data());
   out.count = lowest, out.X = first_columns(all, m, m, lowest), out.squares = squares;
-  if (follower && lowest < m) {
+  if (follower) {
     const int wide = lowest + 2 < m ? lowest + 2 : m;
     std::vector<Real> Y(std::size_t(m * wide)), L = link.K, Z(std::size_t(wide * wide));
     cholesky(m, L.data());

@@ -44,7 +44,8 @@ class Trial {
         strip(last_flexible(*plan.robot)),
         end(plan.t.back() - plan.t.front()),
         ticks(long(std::ceil(end * controller.law().rate_Hz - 1e-6))) {
-    if (plan.method != "auto" && !(steps = make_method(plan.method, loop.integration)))
+    steps = make_method(plan.method, loop.integration, plan.rtol);
+    if (!steps && plan.method != "auto")
       throw std::invalid_argument("there is no method " + plan.method);
   }
 

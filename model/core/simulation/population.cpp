@@ -44,18 +44,12 @@ struct Ran {
   std::string method;
 };
 
-bool same_equations(const Shape &a, const Shape &b) {
-  return a.joint == b.joint && a.m == b.m && a.P == b.P && a.first == b.first && a.rail == b.rail &&
-         a.intervals == b.intervals;
-}
-
-// Whether two robots can share a pack.
+// Whether two robots of one table, which has the same joints and unknowns for all, can share a
+// pack: their lines have as many points, too.
 bool alike(const Starter &a, const Starter &b) {
   const Model<double> &p = a.model(), &q = b.model();
-  bool out =
-      a.method == b.method && p.pieces.size() == q.pieces.size() && p.mass_damped == q.mass_damped;
-  for (std::size_t i = 0; out && i < p.pieces.size(); ++i)
-    out = same_equations(p.pieces[i], q.pieces[i]);
+  bool out = a.method == b.method && p.mass_damped == q.mass_damped;
+  for (std::size_t i = 0; out && i < p.pieces.size(); ++i) out = p.pieces[i].P == q.pieces[i].P;
   for (std::size_t i = 0; out && i < a.acting.joints.size(); ++i) {
     const JointDrive &one = a.acting.joints[i], &other = b.acting.joints[i];
     out = (one.prescribed && one.follows()) == (other.prescribed && other.follows());
@@ -127,10 +121,11 @@ class Worker {
     const bool own = all_.q.empty(), each = all_.q.size() == std::size_t(all_.robots.count) * n;
     if ((!own && !each && all_.q.size() != n) || (!all_.v.empty() && all_.v.size() != n))
       throw std::invalid_argument("the start needs an entry an unknown");
-    const auto first = all_.q.begin() + (each ? std::ptrdiff_t(std::size_t(k) * n) : 0);
-    out.q =
-        own ? std::vector<double>(n, 0.0) : std::vector<double>(first, first + std::ptrdiff_t(n)),
-    out.v = all_.v.empty() ? std::vector<double>(n, 0.0) : all_.v;
+    out.q.assign(n, 0.0), out.v.assign(n, 0.0);
+    if (!own)
+      std::copy_n(all_.q.begin() + (each ? std::ptrdiff_t(std::size_t(k) * n) : 0), n,
+                  out.q.begin());
+    std::copy(all_.v.begin(), all_.v.end(), out.v.begin());
     for (int i = 0; i < model.links(); ++i) {
       const std::size_t link = std::size_t(i), row = std::size_t(model.first[link]);
       const double *limits = all_.limits + 2 * (std::size_t(k) * model.first.size() + link);
@@ -158,7 +153,8 @@ class Worker {
     std::copy(starter.v.begin(), starter.v.end(), run.z.begin() + model.n);
     const char *name = method_without_trial(run, all_.times.front(), all_.rtol);
     starter.open = name == nullptr && all_.rtol >= SHARPEST;
-    starter.method = name ? name : starter.open ? "exponential" : all_.method;
+    if (starter.open) name = "exponential";
+    if (name) starter.method = name;
   }
 
   static bool inside_limits(const Starter &starter, Ending &ending) {
@@ -328,9 +324,7 @@ class Worker {
       for (std::size_t e = 0; e < KINDS; ++e) missing += last[k][e] - first[k][e];
       const double strain = last[k][1] - first[k][1] - account[STRAIN];
       for (int of : {WORK, LOSS, NUMERICAL}) scale[k] = std::fmax(scale[k], std::fabs(account[of]));
-      const double whole = std::fabs(missing) > std::fabs(strain) || std::isnan(missing)
-                               ? std::fabs(missing)
-                               : std::fabs(strain);
+      const double whole = larger(std::fabs(missing), std::fabs(strain));
       endings_[std::size_t(robots[k])].balance = whole / std::fmax(scale[k], 1e-300);
     }
   }
@@ -374,10 +368,9 @@ class Worker {
 
   // Rows of a record that are outputs; after a limit one more follows.
   int reached(const Record &record) const {
+    const int most = std::min(record.rows, int(all_.times.size()));
     int row = 0;
-    while (row < record.rows && row < int(all_.times.size()) &&
-           record.t[std::size_t(row)] == all_.times[std::size_t(row)])
-      ++row;
+    while (row < most && record.t[std::size_t(row)] == all_.times[std::size_t(row)]) ++row;
     return row;
   }
 };

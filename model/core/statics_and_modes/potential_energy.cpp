@@ -19,12 +19,12 @@ std::size_t room(const Piece<double> &c, bool changed) {
                      (changed ? m + P * (P + 3) : 0));
 }
 
-// Weights and shapes of the next hub: at the tip, or under a slider, as in kinematics.hpp.
+// Weights and shapes of the next hub: at the tip, or under a slider `next`, as in kinematics.hpp.
 void put_next_hub(const Piece<double> &c, const Piece<double> *next, const double *q, double *w,
                   double *a) {
   const bool sleeve = c.joint == HubJoint::sleeve;
   const double d = sleeve ? q[c.first] : 1.0;
-  if (next == nullptr || next->joint != HubJoint::slider) {
+  if (next == nullptr) {
     for (int j = 0; j < c.P; ++j) w[j] = d * c.w[j];
     std::copy(c.tip_angle, c.tip_angle + c.m, a);
     return;

@@ -242,6 +242,15 @@ def test_a_load_bends_the_strip_and_pulses_follow_knots():
         assert len(times) > 10 and (np.diff(times) > 0).all() and set(directions) <= {1.0, -1.0}
 
 
+def test_more_knots_than_the_board_has_room_for_are_followed_to_the_last():
+    count = 300
+    place = np.cumsum(np.full(count, 64))
+    knots = np.stack([np.zeros(count), place, np.zeros(count), np.zeros(count)], 1)
+    rows = {"period_log2": 1, "knots": knots.astype(np.int64), "given": 0, "ticks": 3 * count}
+    _, directions = core.board_pulses(**(BOARD | rows | {"open_loop": False}))
+    assert np.asarray(directions).sum() == place[-1] / 256  # a step is 256 of its counts
+
+
 def test_a_linear_law_of_another_shape_is_refused():
     core.Controller(**linear())
     shapes = {"F": (3, 4), "G": (3, 1), "L": (3, 1), "C": (1, 3), "K": (2, 2), "Kr": (2, 1)}
@@ -278,6 +287,10 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("Simulation", {"loads": (LOADS[0][:, :2], *LOADS[1:])}, "another shape"),
     ("Simulation", {"loads": (LOADS[0], LOADS[1][:, :5], LOADS[2])}, "another shape"),
     ("Simulation", {"loads": (LOADS[0], LOADS[1][:0], LOADS[2])}, "another shape"),
+    ("copies", {"moves": np.ones(2, dtype=bool)}, "another shape"),
+    ("copies", {"arrived": np.zeros(2, dtype=bool)}, "another shape"),
+    ("copies", {"steps": 0}, "another shape"),
+    ("copies", {"threads": 0}, "another shape"),
     ("Simulation", {"method": "none"}, "no method"),
     ("population", {"method": "none"}, "no method"),
     ("GainSweep", {"method": "none"}, "no method"),
@@ -298,6 +311,26 @@ def test_what_is_not_there_is_refused(name, other, said):
     function, good, _ = CALLS[name]
     with pytest.raises(ValueError, match=said):
         function(**(good | other))
+
+
+CONTACT = np.array([[0.0, 0.0, 1.0, 0.1, 1.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    "segments, rows, said",
+    [
+        (np.zeros((2, 9)), CONTACT, "another shape"),
+        (SEGMENTS, np.zeros((1, 5)), "another shape"),
+        (SEGMENTS, CONTACT - [1, 0, 0, 0, 0, 0], "no such joint"),
+        (SEGMENTS, CONTACT + [2, 0, 0, 0, 0, 0], "no such joint"),
+        (SEGMENTS, CONTACT - [0, 1, 0, 0, 0, 0], "no such joint"),
+        (SEGMENTS, CONTACT + [0, 2, 0, 0, 0, 0], "no such joint"),
+        (SEGMENTS, CONTACT + [0, 0, 2, 0, 0, 0], "no such joint"),
+    ],
+)
+def test_contacts_that_are_none_are_refused(segments, rows, said):
+    with pytest.raises(ValueError, match=said):
+        core.Simulation(**(RUN | {"function": (segments, rows)}))
 
 
 def test_drives_of_another_robot_are_refused():

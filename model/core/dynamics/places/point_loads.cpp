@@ -98,7 +98,6 @@ Vec3<double> turned(const Piece<double> &c, const PieceState<double> &k, const S
 
 void add_point_loads(const Model<double> &model, Workspace<double> &work, const LoadPlace *places,
                      int count, const double *values, const double *q, double *out) {
-  if (count == 0) return;
   const std::vector<double> still(std::size_t(model.n), 0.0);
   outward_kinematics(model, work, q, still.data());
   std::vector<Station> stations;

@@ -12,7 +12,7 @@ Pose<double> point_on_piece(const Piece<double> &c, const PieceState<double> &k,
                             double x, double length) {
   const LineRule &rule = line_rule(c.P);
   std::vector<double> value(std::size_t(c.P) + 1), first(value.size()), second(value.size());
-  const double u = length > 0.0 ? 2.0 * x / length - 1.0 : -1.0;
+  const double u = 2.0 * x / length - 1.0;
   std::vector<double> slopes(value.size());  // of the polynomials at the tip
   legendre(1.0, c.P, value.data(), slopes.data(), second.data());
   legendre(u, c.P, value.data(), first.data(), second.data());

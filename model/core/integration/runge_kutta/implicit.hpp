@@ -69,7 +69,8 @@ class Implicit : public Method<Real> {
         vs(ys),
         a(ys),
         next(ys),
-        other(padded(integration.size), Real(0.0)) {
+        other(padded(integration.size), Real(0.0)),
+        reaction(integration.acts.reaction) {
     for (int s = 1; s < s_.stages; ++s)
       for (int j = first_node(s); j < last_node(s); ++j) {
         scale[s][j] = 1.0;
@@ -96,10 +97,7 @@ class Implicit : public Method<Real> {
     for (int s = 1; s < s_.stages; ++s) {
       guess(h, s);
       known(h, s);
-      refused = larger(refused, solve(smaller(t + h * s_.C[s], last), h * s_.gamma));
-      bool none = true;
-      for (int k = 0; k < this->LANES; ++k) none = none && lane(refused, k) != 0.0;
-      if (none) return refused;
+      if (!solve(smaller(t + h * s_.C[s], last), h * s_.gamma, refused)) return refused;
       std::copy(znew + n, znew + 2 * n, K[s]);
       std::copy(a.begin(), a.begin() + n, K[s] + n);
       c.rates(znew, znew + n, K[s] + 2 * n);
@@ -109,9 +107,11 @@ class Implicit : public Method<Real> {
       for (int j = 0; j < s_.stages; ++j) sum += s_.A[s_.stages - 1][j] * K[j][k];
       znew[k] = c.z[k] + h * sum;
     }
-    K.sum(nullptr, h, s_.E, s_.stages, c.error.data());
+    K.sum(nullptr, h, s_.E, s_.stages, other.data());
+    const Real solved = not_refused(refused);
+    take(solved, other.data(), c.error.data(), c.size);
     made = h;
-    return larger(refused, CAUTION * c.weights.norm(c.error.data(), znew));
+    return choose_less(Real(0.5), solved, CAUTION * c.weights.norm(other.data(), znew), refused);
   }
 
   void accept(const Real &which) override {
@@ -137,7 +137,7 @@ class Implicit : public Method<Real> {
   using Method<Real>::c;
   const DiagonallyImplicit &s_;
   Stages<Real> K;
-  std::vector<Real> ys, vs, a, next, other;
+  std::vector<Real> ys, vs, a, next, other, reaction;
   Real steep = 0.0;  // 1: slopes of the caller's function are to be found (again): at the start, or
                      // as a stage was slow to converge
   double scale[6][6] = {};  // (stage, node): of Lagrange's polynomials of its guess
@@ -187,27 +187,38 @@ class Implicit : public Method<Real> {
     c.acts.prescribe(c.znew.data(), c.znew.data() + n);
   }
 
-  // Passes until a, which comes as a guess, moves no more; a lane that is done keeps its numbers.
-  // REFUSED where they did not converge, what is not a number where the equations gave that; else
-  // 0.
-  Real solve(const Real &time, const Real &gh) {
+  // 1 for the robots that are not refused, else 0.
+  Real not_refused(const Real &refused) const {
+    Real out = 0.0;
+    for (int k = 0; k < this->LANES; ++k)
+      if (lane(refused, k) == 0.0) set_lane(out, k, 1.0);
+    return out;
+  }
+
+  // Passes until a, which comes as a guess, moves no more. A robot that is done keeps its numbers,
+  // reactions and forces too, and so does one that `refused` names: nothing depends on neighbours.
+  // `refused` becomes REFUSED where passes did not converge, what is not a number where the
+  // equations gave that. True: some robot goes on.
+  bool solve(const Real &time, const Real &gh, Real &refused) {
     const int n = c.n;
     Real *q = c.znew.data(), *v = q + n;
-    Real open = 1.0, missed = 0.0, before = 1e300;
+    Real open = not_refused(refused), before = 1e300;
     c.acts.at(time);
-    for (int k = 2 * n; k < c.size; ++k) c.error[k] = Real(0.0);
-    for (int turn = 0; turn < MOST; ++turn) {
+    std::fill(other.begin(), other.end(), Real(0.0));
+    for (int turn = 0; worst(open) > 0.0; ++turn) {
       place(gh);
-      c.acts.load_stage(q, v, turn == 0);
+      c.acts.load_stage(open, q, v, turn == 0);
       c.plant.accelerate(c.acts.pass(q, v, ys.data(), vs.data(), gh * gh, gh), next.data(),
-                         c.acts.reaction.data());
+                         reaction.data());
       ++c.passes;
       for (int k = 0; k < n; ++k) {
         const Real step = gh * (next[k] - a[k]);
-        c.error[k] = gh * step, c.error[n + k] = step;
+        other[k] = gh * step, other[n + k] = step;
       }
-      const Real moved = c.weights.norm(c.error.data(), c.z.data());
+      const Real moved = c.weights.norm(other.data(), c.z.data());
       take(open, next.data(), a.data(), n);
+      take(open, reaction.data(), c.acts.reaction.data(), c.plant.joints);
+      take(open, other.data(), c.error.data(), c.size);
       for (int k = 0; k < this->LANES; ++k) {
         if (lane(open, k) == 0.0) continue;
         const double m = lane(moved, k), known_rate = lane(contraction, k),
@@ -221,13 +232,12 @@ class Implicit : public Method<Real> {
         if (near || far) set_lane(open, k, 0.0);
         if (turn >= SLOW) set_lane(steep, k, 1.0);
         if (far && !near)
-          set_lane(missed, k, std::isfinite(m) ? this->REFUSED : m - m), set_lane(steep, k, 1.0);
+          set_lane(refused, k, std::isfinite(m) ? this->REFUSED : m - m), set_lane(steep, k, 1.0);
       }
       before = moved;
-      if (worst(open) == 0.0) break;
     }
     place(gh);
-    return missed;
+    return worst(not_refused(refused)) > 0.0;
   }
 };
 

@@ -50,7 +50,7 @@ class Rosenbrock {
   std::vector<Real> y, rate, q_end, v_end, turn, first, second;
 
   void look(const Real *q, const Real *v, const Real *ys, const Real *vs, const Real &gh, Real *a) {
-    acts.load_stage(q, v, true);
+    acts.load_stage(Real(1.0), q, v, true);
     plant.accelerate(acts.pass(q, v, ys, vs, gh * gh, gh), a, acts.reaction.data());
   }
 };

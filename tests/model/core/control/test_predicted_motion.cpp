@@ -64,59 +64,62 @@ TEST("an interval has the motion's accelerations, and follows the equations for 
 }
 
 TEST("a program without its states is that with them") {
-  const int N = 3, n = 4, p = 2, outputs = 3, rows = 1, V = N * p;
   check::Random random;
-  const Numbers R = some(N * n * n, 1.0, random), G = some(N * n * p, 1.0, random),
-                d = some(N * n, 1.0, random), u = some(V, 1.0, random),
-                start = some(n, 1.0, random), wanted = some(N * n, 1.0, random),
-                W = some(N * outputs * n, 1.0, random), end = some(n * n, 1.0, random),
-                limited = some(n, 1.0, random), U = some(V, 1.0, random);
-  TickProgram program;
-  program.N = N, program.n = n, program.inputs = p, program.outputs = outputs, program.rows = rows;
-  program.R = R.data(), program.G = G.data(), program.d = d.data();
-  program.W = W.data(), program.end = end.data(), program.limited = limited.data();
-  const CondensedProgram found = condense(program);
-  const TickVectors of =
-      renew(program, found.by_force.data(), start.data(), u.data(), wanted.data());
-  // the states under u + U, and what they cost, against the same with U = 0
-  auto cost = [&](const Numbers &more, bool compare) {
-    Numbers now = start;
-    double sum = 0.0;
-    for (int k = 0; k < N; ++k) {
-      Numbers next(n);
-      for (int i = 0; i < n; ++i) {
-        next[i] = d[k * n + i];
-        for (int l = 0; l < n; ++l) next[i] += R[(k * n + i) * n + l] * now[l];
-        for (int j = 0; j < p; ++j)
-          next[i] += G[(k * n + i) * p + j] * (u[k * p + j] + more[k * p + j]);
-      }
-      now = next;
-      double shown = 0.0, row = of.at[k];
-      for (int i = 0; i < n; ++i) {
-        shown += limited[i] * now[i];
-        double state = of.x[k * n + i];
-        for (int j = 0; j < V; ++j) state += found.by_force[(k * n + i) * V + j] * more[j];
-        if (compare) CHECK_NEAR(state, now[i], 1e-12 * (1 + std::fabs(now[i])));
-      }
-      for (int j = 0; j < V; ++j) row += found.A[k * V + j] * more[j];
-      if (compare) CHECK_NEAR(row, shown, 1e-12 * (1 + std::fabs(shown)));
-      auto pay = [&](const double *weights, int count) {
-        for (int o = 0; o < count; ++o) {
-          double off = 0.0;
-          for (int i = 0; i < n; ++i) off += weights[o * n + i] * (now[i] - wanted[k * n + i]);
-          sum += off * off;
+  for (int n : {3, 4, 6}) {
+    const int N = 3, p = 2, outputs = 3, rows = 1, V = N * p;
+    const Numbers R = some(N * n * n, 1.0, random), G = some(N * n * p, 1.0, random),
+                  d = some(N * n, 1.0, random), u = some(V, 1.0, random),
+                  start = some(n, 1.0, random), wanted = some(N * n, 1.0, random),
+                  W = some(N * outputs * n, 1.0, random), end = some(n * n, 1.0, random),
+                  limited = some(n, 1.0, random), U = some(V, 1.0, random);
+    TickProgram program;
+    program.N = N, program.n = n, program.inputs = p, program.outputs = outputs,
+    program.rows = rows;
+    program.R = R.data(), program.G = G.data(), program.d = d.data();
+    program.W = W.data(), program.end = end.data(), program.limited = limited.data();
+    const CondensedProgram found = condense(program);
+    const TickVectors of =
+        renew(program, found.by_force.data(), start.data(), u.data(), wanted.data());
+    // the states under u + U, and what they cost, against the same with U = 0
+    auto cost = [&](const Numbers &more, bool compare) {
+      Numbers now = start;
+      double sum = 0.0;
+      for (int k = 0; k < N; ++k) {
+        Numbers next(n);
+        for (int i = 0; i < n; ++i) {
+          next[i] = d[k * n + i];
+          for (int l = 0; l < n; ++l) next[i] += R[(k * n + i) * n + l] * now[l];
+          for (int j = 0; j < p; ++j)
+            next[i] += G[(k * n + i) * p + j] * (u[k * p + j] + more[k * p + j]);
         }
-      };
-      pay(W.data() + k * outputs * n, outputs);
-      if (k + 1 == N) pay(end.data(), n);
+        now = next;
+        double shown = 0.0, row = of.at[k];
+        for (int i = 0; i < n; ++i) {
+          shown += limited[i] * now[i];
+          double state = of.x[k * n + i];
+          for (int j = 0; j < V; ++j) state += found.by_force[(k * n + i) * V + j] * more[j];
+          if (compare) CHECK_NEAR(state, now[i], 1e-12 * (1 + std::fabs(now[i])));
+        }
+        for (int j = 0; j < V; ++j) row += found.A[k * V + j] * more[j];
+        if (compare) CHECK_NEAR(row, shown, 1e-12 * (1 + std::fabs(shown)));
+        auto pay = [&](const double *weights, int count) {
+          for (int o = 0; o < count; ++o) {
+            double off = 0.0;
+            for (int i = 0; i < n; ++i) off += weights[o * n + i] * (now[i] - wanted[k * n + i]);
+            sum += off * off;
+          }
+        };
+        pay(W.data() + k * outputs * n, outputs);
+        if (k + 1 == N) pay(end.data(), n);
+      }
+      return sum;
+    };
+    double quadratic = 0.0;
+    for (int i = 0; i < V; ++i) {
+      quadratic += 2.0 * of.g[i] * U[i];
+      for (int j = 0; j < V; ++j) quadratic += U[i] * found.H[i * V + j] * U[j];
     }
-    return sum;
-  };
-  double quadratic = 0.0;
-  for (int i = 0; i < V; ++i) {
-    quadratic += 2.0 * of.g[i] * U[i];
-    for (int j = 0; j < V; ++j) quadratic += U[i] * found.H[i * V + j] * U[j];
+    const double more = cost(U, true) - cost(Numbers(V, 0.0), true);
+    CHECK_NEAR(quadratic, more, 1e-11 * (1 + std::fabs(more)));
   }
-  const double more = cost(U, true) - cost(Numbers(V, 0.0), true);
-  CHECK_NEAR(quadratic, more, 1e-11 * (1 + std::fabs(more)));
 }

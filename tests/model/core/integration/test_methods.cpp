@@ -167,28 +167,33 @@ TEST("four robots side by side have the digits of each alone") {
   Model<Pack<4>> model = pack(list);
   Workspace<Pack<4>> work(model);
   ModelPlant<Pack<4>> plant(model, work);
-  for (const char *name : NAMES) {
-    Loop<Pack<4>> loop(plant, acts, grid(0.2, 11), 1e-4);
-    std::unique_ptr<Method<Pack<4>>> method = make_method(name, loop.integration);
-    std::vector<Pack<4>> zero(std::size_t(model.n), Pack<4>(0.0));
-    loop.start(zero.data(), zero.data(), 1e-3);
-    while (loop.advance(*method, 1000)) {
-    }
-    for (int k = 0; k < 4; ++k) {
-      RunOf run(robots[k], acts[k], grid(0.2, 11), 1e-4, name);
-      const std::vector<double> still(std::size_t(model.n), 0.0);
-      run.loop.start(still.data(), still.data(), 1e-3);
-      while (run.loop.advance(*run.method, 1000)) {
+  for (bool given : {false, true})
+    for (const char *name : NAMES) {
+      for (Inputs &each : acting) {
+        each.joints[1].motion = {segment(0.0, 0.0, 0.5)}, each.joints[1].prescribed = given;
+        each.joints[1].kp = 2.0;
       }
-      CHECK(run.loop.run_state[0].steps == loop.run_state[std::size_t(k)].steps &&
-            run.loop.run_state[0].status == Status::done);
-      bool same = loop.record[std::size_t(k)].rows == run.loop.record[0].rows;
-      for (int j = 0; same && j < 11 * run.loop.record[0].size; ++j)
-        same = check::same_bits(run.loop.record[0].state[std::size_t(j)],
-                                loop.record[std::size_t(k)].state[std::size_t(j)]);
-      CHECK(same);
+      Loop<Pack<4>> loop(plant, acts, grid(0.2, 11), 1e-4);
+      std::unique_ptr<Method<Pack<4>>> method = make_method(name, loop.integration);
+      std::vector<Pack<4>> zero(std::size_t(model.n), Pack<4>(0.0));
+      loop.start(zero.data(), zero.data(), 1e-3);
+      while (loop.advance(*method, 1000)) {
+      }
+      for (int k = 0; k < 4; ++k) {
+        RunOf run(robots[k], acts[k], grid(0.2, 11), 1e-4, name);
+        const std::vector<double> still(std::size_t(model.n), 0.0);
+        run.loop.start(still.data(), still.data(), 1e-3);
+        while (run.loop.advance(*run.method, 1000)) {
+        }
+        CHECK(run.loop.run_state[0].steps == loop.run_state[std::size_t(k)].steps &&
+              run.loop.run_state[0].status == Status::done);
+        bool same = loop.record[std::size_t(k)].rows == run.loop.record[0].rows;
+        for (int j = 0; same && j < 11 * run.loop.record[0].size; ++j)
+          same = check::same_bits(run.loop.record[0].state[std::size_t(j)],
+                                  loop.record[std::size_t(k)].state[std::size_t(j)]);
+        CHECK(same);
+      }
     }
-  }
 }
 
 TEST("a robot that stands still, with a locked joint, takes long steps") {

@@ -1,54 +1,12 @@
 // The time loop and its methods, on plants whose motion is known.
-#include "check.hpp"
-#include "integration/runge_kutta/dop853.hpp"
 #include "integration/runge_kutta/embedded_pairs.hpp"
-#include "integration/runge_kutta/implicit.hpp"
-#include "integration/time_loop.hpp"
-#include "plants.hpp"
+#include "loop_runs.hpp"
 
 using namespace flexura;
 
 namespace {
 
 constexpr double INFINITE = std::numeric_limits<double>::infinity();
-
-std::vector<double> grid(double from, double to, int count) {
-  std::vector<double> t;
-  for (int k = 0; k < count; ++k) t.push_back(from + (to - from) * k / (count - 1));
-  return t;
-}
-Segment segment(double t0, double c0, double c1 = 0.0) {
-  return {t0, {c0, c1, 0.0, 0.0, 0.0, 0.0}, 0.0, 0.0, 0.0};
-}
-
-// One robot's run, with the method that the test names.
-struct Run {
-  Loop<double> loop;
-  std::unique_ptr<Method<double>> method;
-  Run(Plant<double> &plant, Inputs &acting, std::vector<double> t, double rtol, bool implicit)
-      : Run(plant, &acting, std::move(t), rtol, implicit) {}
-  Run(Plant<double> &plant, Inputs *acting, std::vector<double> t, double rtol, bool implicit)
-      : loop(plant, &acting, std::move(t), rtol) {
-    if (implicit)
-      method = std::make_unique<Implicit<double>>(loop.integration);
-    else
-      method = std::make_unique<Explicit<double>>(loop.integration);
-  }
-  Status operator()(std::vector<double> q, std::vector<double> v, double first = 1e-3) {
-    loop.start(q.data(), v.data(), first);
-    while (loop.advance(*method, 100)) {
-    }
-    return loop.run_state[0].status;
-  }
-  const Record &record() const { return loop.record[0]; }
-  double at(int row, int k) const {
-    return record().state[static_cast<std::size_t>(row * record().size + k)];
-  }
-  double account(int row, Account which) const { return at(row, record().size - ACCOUNTS + which); }
-  double drive(int row, int i) const {
-    return record().drive[static_cast<std::size_t>(row * record().joints + i)];
-  }
-};
 
 // The error at t = 1 of `count` equal steps of q'' + q = 0 from q = 1.
 template <class M, class... Arguments>
@@ -75,17 +33,6 @@ template <class M, class... Arguments>
 double order(int coarse, const Arguments &...more) {
   return std::log2(oscillator_error<M>(coarse, more...) / oscillator_error<M>(2 * coarse, more...));
 }
-
-// A controller that remembers what it was called for.
-struct Recorder : Sampler {
-  std::vector<double> t, place;
-  double gain = 0.0;
-  void tick(long k, double now, const double *q, const double *v, SampledOutput &held) override {
-    CHECK(k == static_cast<long>(t.size()));
-    t.push_back(now), place.push_back(q[0]);
-    held.force[0] = -gain * q[0] - 0.1 * gain * v[0];
-  }
-};
 
 }  // namespace
 
@@ -439,57 +386,55 @@ TEST("a rehearsal leaves no trace") {
   CHECK(run(true) == run(false));
 }
 
-TEST("a pack gives each robot the digits that it has alone") {
+TEST("a budget that a rejected step uses up, or the last step of a run") {
+  Masses<double> plant(1);
+  plant.stiffness = {1e4};
+  Inputs acting(1);
+  Run rejected(plant, acting, grid(0.0, 1.0, 3), 1e-6, true);
+  rejected.loop.most_steps = 1;
+  CHECK(rejected({1.0}, {0.0}, 0.9) == Status::exhausted);
+  CHECK(rejected.loop.run_state[0].rejected == 1 && rejected.loop.run_state[0].t == 0.0);
+  Run whole(plant, acting, grid(0.0, 1.0, 3), 1e-6, true);
+  CHECK(whole({1.0}, {0.0}) == Status::done);
+  const RunState &took = whole.loop.run_state[0];
+  Run exact(plant, acting, grid(0.0, 1.0, 3), 1e-6, true);
+  exact.loop.most_steps = took.steps + took.rejected;
+  CHECK(exact({1.0}, {0.0}) == Status::exhausted);
+  CHECK(exact.loop.run_state[0].t == 1.0 && exact.record().rows == 3);
+  CHECK(exact.record().state == whole.record().state);
+}
+
+TEST("a joint that leaves from its limit stays there; a run that goes on has the row of a limit") {
+  Masses<double> plant(1);
+  Inputs acting(1);
+  acting.high[0] = 0.2;
+  Run there(plant, acting, grid(0.0, 1.0, 3), 1e-6, false);
+  CHECK(there({0.2}, {1.0}) == Status::limit);
+  CHECK(there.loop.run_state[0].t == 0.0 && there.record().rows == 1 && there.at(0, 0) == 0.2);
+  Run later(plant, acting, {0.0, 0.1}, 1e-6, false);
+  CHECK(later({0.0}, {1.0}) == Status::done);
+  later.loop.go_on(1.0, 1.0, false);
+  while (later.loop.advance(*later.method, 100)) {
+  }
+  CHECK(later.loop.run_state[0].status == Status::limit && later.record().rows == 1);
+  CHECK_NEAR(later.record().t[0], 0.2, 1e-12);
+  CHECK_NEAR(later.at(0, 0), 0.2, 1e-12);
+}
+
+TEST("a joint on its motion: Coulomb friction is the drive's, a locked one does not follow") {
   for (bool implicit : {false, true}) {
-    Masses<Pack<4>> four(1, 1);
-    std::vector<Inputs> acting(4, Inputs(1));
-    std::vector<Recorder> recorder(4);
-    Inputs *list[4];
-    std::vector<double> q{0.3, 0.1, -0.4, 0.7};
-    Pack<4> q0[2], v0[2] = {Pack<4>(0.0), Pack<4>(0.2)};
-    for (int k = 0; k < 4; ++k) {
-      acting[k].joints[0].force = {segment(0.0, 1.0 + k), segment(0.2 + 0.05 * k, -1.0)};
-      if (k == 2) acting[k].sampler = &recorder[k], acting[k].rate_Hz = 7.0, recorder[k].gain = 5.0;
-      if (k == 3) acting[k].low[0] = 0.2;
-      list[k] = &acting[k];
-      four.stiffness[0].set(k, 4.0 + k), four.stiffness[1].set(k, 100.0 * (1 + k)),
-          four.damping[1].set(k, 0.1 * k);
-      four.coulomb[0].set(k, k == 1 ? 0.2 : 0.0), four.gravity[0].set(k, k);
-      q0[0].set(k, q[k]), q0[1].set(k, 0.1);
+    Masses<double> plant(2);
+    plant.coulomb = {0.4, 0.0}, plant.locked[1] = true;
+    Inputs acting(2);
+    for (JointDrive &drive : acting.joints)
+      drive.motion = {segment(0.0, 0.0, 0.5)}, drive.prescribed = true;
+    Run run(plant, acting, grid(0.0, 1.0, 5), 1e-7, implicit);
+    CHECK(run({0.0, 0.3}, {0.5, 0.0}) == Status::done);
+    for (int k = 0; k < 5; ++k) {
+      CHECK_NEAR(run.at(k, 0), 0.125 * k, 1e-15);
+      CHECK_NEAR(run.drive(k, 0), 0.4, 1e-12);
+      CHECK(run.at(k, 1) == 0.3 && run.at(k, 3) == 0.0);
     }
-    for (auto *x : {&four.damping[0], &four.gravity[1]}) *x = Pack<4>(0.0);
-    Loop<Pack<4>> loop(four, list, grid(0.0, 2.0, 21), 1e-6);
-    std::unique_ptr<Method<Pack<4>>> method;
-    if (implicit)
-      method = std::make_unique<Implicit<Pack<4>>>(loop.integration);
-    else
-      method = std::make_unique<Explicit<Pack<4>>>(loop.integration);
-    loop.start(q0, v0, 1e-3);
-    while (loop.advance(*method, 100)) {
-    }
-    for (int k = 0; k < 4; ++k) {
-      Masses<double> one(1, 1);
-      for (int j = 0; j < 2; ++j) {
-        one.stiffness[j] = four.stiffness[j][k], one.damping[j] = four.damping[j][k],
-        one.gravity[j] = four.gravity[j][k];
-      }
-      one.coulomb[0] = four.coulomb[0][k];
-      Inputs alone(1);
-      Recorder own;
-      alone.joints = acting[k].joints, alone.low = acting[k].low, alone.rate_Hz = acting[k].rate_Hz;
-      if (acting[k].sampler) own.gain = 5.0, alone.sampler = &own;
-      Run run(one, alone, grid(0.0, 2.0, 21), 1e-6, implicit);
-      CHECK(run({q[k], 0.1}, {0.0, 0.2}) == loop.run_state[k].status);
-      CHECK(run.loop.run_state[0].status == (k == 3 ? Status::limit : Status::done));
-      CHECK(run.record().rows == loop.record[k].rows &&
-            run.loop.run_state[0].steps == loop.run_state[k].steps);
-      bool same = true;
-      for (std::size_t j = 0;
-           j < static_cast<std::size_t>(loop.record[k].rows * loop.record[k].size); ++j)
-        same = same && check::same_bits(run.record().state[j], loop.record[k].state[j]);
-      for (std::size_t j = 0; j < static_cast<std::size_t>(loop.record[k].rows); ++j)
-        same = same && check::same_bits(run.record().drive[j], loop.record[k].drive[j]);
-      CHECK(same);
-    }
+    CHECK_NEAR(run.account(4, LOSS), 0.2, 1e-9);
   }
 }

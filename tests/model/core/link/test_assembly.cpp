@@ -1,6 +1,8 @@
 // What cannot be assembled is refused by its link and key; robots that are assembled together.
 #include "link/assembly.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <string>
@@ -68,12 +70,24 @@ TEST("a joint that moves no mass, or one that is not finite, is refused; a locke
     robot.payload_mass = mass;
     CHECK(refused(robot).empty() == std::isfinite(mass));
   }
+  robot.payload_mass = 1e308, robot.links[1].length = 3.0;  // its moment of inertia is not finite
+  CHECK(refused(robot) == "1 joint");
   Link massless = strip(0.5, 2);
   massless.material[0].mass[0] = 0.0;
   CHECK(refused(of({massless})) == "0 joint");
   robot = of({massless});
   robot.links[0].joint.hub_inertia = 1e-3, robot.payload_mass = 0.1, robot.payload_inertia = 1e-4;
   CHECK(refused(robot) == "");
+}
+
+TEST("an infinite hub is refused, whatever its joint") {
+  for (JointKind kind : {JointKind::revolute, JointKind::slider}) {
+    Robot robot = of({rigid(0.2, 1.0)});
+    robot.links[0].joint.kind = kind;
+    CHECK(refused(robot) == "");
+    robot.links[0].joint.hub_mass = robot.links[0].joint.hub_inertia = INFINITE;
+    CHECK(refused(robot) == "0 joint");
+  }
 }
 
 TEST("beyond a transmission there must be a mass") {
@@ -83,6 +97,9 @@ TEST("beyond a transmission there must be a mass") {
   CHECK(refused(robot) == "0 joint.transmission");
   robot.links[0].joint.hub_inertia = INFINITE;
   CHECK(refused(robot) == "0 joint.transmission");
+  robot.links[0].joint.hub_inertia = 0.0, robot.payload_mass = 1e308, robot.links[0].length = 3.0;
+  CHECK(refused(robot) == "0 joint.transmission");
+  robot.payload_mass = 0.0;
   robot.links[0].joint.hub_inertia = 1e-3;
   CHECK(refused(robot) == "");
 }
@@ -101,6 +118,9 @@ TEST("robots of unlike spaces of modes are assembled together with the numbers o
   robots[1] = of({strip(0.5, 8, 4)});  // as many shapes, another number of modes: no pack either
   assemble(pointers, 2, models, faults);
   for (int k = 0; k < 2; ++k) CHECK(!faults[k] && models[k].numbers == assemble(robots[k]).numbers);
+  for (int k = 0; k < 2; ++k) robots[k].links[0].lumps = {{0.2, 0.1, 1e-4}};  // shapes alike
+  assemble(pointers, 2, models, faults);
+  for (int k = 0; k < 2; ++k) CHECK(!faults[k] && models[k].numbers == assemble(robots[k]).numbers);
   for (int modes : {-1, 3}) {  // a pack of three, with a slider on them
     for (int k = 0; k < 3; ++k) {
       robots[k] = of({strip(0.5 + 0.1 * k, 4, modes), rigid(0.1, 0.2)});
@@ -113,4 +133,21 @@ TEST("robots of unlike spaces of modes are assembled together with the numbers o
   robots[0] = of({});
   assemble(pointers, 1, models, faults);
   CHECK(faults[0] && faults[0]->key == "link");
+}
+
+TEST("elements end at lumps as long as there are elements; a lump without a node weighs as much") {
+  for (int elements : {1, 2, 3, 6}) {
+    Robot robot = of({strip(0.6, elements)});
+    robot.links[0].lumps = {{0.2, 0.1, 0.0}, {0.205, 0.05, 0.0}, {0.4, 0.3, 0.0}};
+    const Model<double> model = assemble(robot);
+    CHECK(model.n == 1 + 2 * elements);
+    double mass = 0.0, ends = 0.0, lumps = 0;
+    for (const Piece<double> &piece : model.pieces) {
+      mass += piece.mass, ends += piece.length;
+      for (const Lump &lump : robot.links[0].lumps) lumps += std::fabs(ends - lump.at) < 1e-12;
+    }
+    CHECK_NEAR(mass, 0.6 * 0.2 + 0.45, 1e-12);
+    CHECK_NEAR(ends, 0.6, 1e-15);
+    CHECK(lumps == std::min(2, elements - 1));
+  }
 }

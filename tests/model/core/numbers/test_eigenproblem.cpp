@@ -209,3 +209,29 @@ TEST("triangles: A = L L^T, solves, a semidefinite matrix, one that is not defin
   Numbers N = {1, 2, 2, 3};
   CHECK(cholesky(2, N.data()) < 0.0);
 }
+
+TEST("a pencil whose diagonal hides that it is indefinite: exact squares") {
+  for (double off : {10.0, 1e3, 1e6}) {
+    const Numbers K{1.0, off, off, 1.0}, M{1.0, 0.0, 0.0, 1.0};
+    Numbers squares(2), shapes(4);
+    CHECK(eigen_pencil(2, K.data(), M.data(), squares.data(), shapes.data()) == 2);
+    CHECK_NEAR(squares[0], 1.0 - off, 1e-9 * off);
+    CHECK_NEAR(squares[1], 1.0 + off, 1e-9 * off);
+  }
+}
+
+TEST("a square far below the others keeps its digits beside one that is nothing") {
+  for (double low : {1e-4, 1e-6, 1e-7}) {
+    Numbers K(9), M(9, 0.0), squares(3), shapes(9);
+    const double b[3] = {std::sqrt(0.5), -std::sqrt(0.5), 0.0};
+    const double c[3] = {std::sqrt(1.0 / 6), std::sqrt(1.0 / 6), -std::sqrt(2.0 / 3)};
+    for (int i = 0; i < 3; ++i) {
+      at(M, 3, i, i) = 1.0;
+      for (int j = 0; j < 3; ++j) at(K, 3, i, j) = low * b[i] * b[j] + c[i] * c[j];
+    }
+    CHECK(eigen_pencil(3, K.data(), M.data(), squares.data(), shapes.data()) == 3);
+    CHECK_NEAR(squares[0], 0.0, 1e-15);
+    CHECK_NEAR(squares[1], low, 1e-15);
+    CHECK_NEAR(squares[2], 1.0, 1e-14);
+  }
+}

@@ -99,6 +99,17 @@ TEST("one that cannot go on stays where it was") {
   CHECK(some.q[4 * n] != -0.5);
 }
 
+TEST("one that leaves its lower limit stays where it was, too") {
+  const Copies copies(arm(0.0));
+  Some some(copies, {0, 1});
+  const std::size_t n = std::size_t(copies.unknowns());
+  some.q[0] = 0.1, some.q[n] = 0.5, some.v[0] = some.v[n] = -2.0, some.low[0] = 0.099;
+  const std::vector<double> before(some.q);
+  some.go(copies, 0.01, 4);
+  CHECK(!some.arrived[0] && some.arrived[1]);
+  CHECK(some.q[0] == before[0] && some.q[n] < before[n]);
+}
+
 TEST("the error goes with the square of the step") {
   const Copies copies(arm(0.0));
   std::vector<Some> runs;

@@ -105,6 +105,8 @@ TEST("a row that costs too much is given up with lower bounds") {
   const Found whole = found(carts("auto"), row), part = found(carts("auto"), row, 1e-3, 0.0);
   CHECK(part.reached < 1.0 && part.joint(1)[ITAE] > 0.0);
   CHECK(part.joint(1)[ITAE] <= whole.joint(1)[ITAE]);
+  const Found both = found(carts("auto"), row, 1e-3, 1.0);  // whose vibration has a price, too
+  CHECK(both.reached == part.reached && both.joint(1)[ITAE] == part.joint(1)[ITAE]);
 }
 
 TEST("two rows by two threads are those of each alone") {

@@ -2,6 +2,8 @@
 // end alone.
 #include "simulation/population.hpp"
 
+#include <stdexcept>
+
 #include "check.hpp"
 #include "control/plant.hpp"
 #include "dynamics/places/outputs.hpp"
@@ -249,4 +251,144 @@ TEST("robots that are assembled together have the numbers of each alone") {
       CHECK(!faults[k] && alone.numbers == models[k].numbers && alone.n == models[k].n);
     }
   }
+}
+
+namespace {
+
+// Robot k of a population, with what acts on it, is that of a population of its own.
+void check_alone(const Many &many, const Population &population) {
+  const Results all = results(population, 1);
+  for (int k = 0; k < many.robots; ++k) {
+    const Many only = many.of({k});
+    Population one = only.population(population.method, population.rtol);
+    one.drives = {population.drives[std::size_t(population.drive_of[std::size_t(k)])]};
+    CHECK(same(all, k, results(one, 1), 0));
+  }
+}
+
+}  // namespace
+
+TEST("robots of other damping, points or methods share no pack") {
+  Many many(8, 2);
+  many.number(1, 1, 4) = 0.3;   // damping in proportion to mass
+  many.number(2, 1, 11) = 2.0;  // "auto" takes implicit steps
+  many.material[3 * MATERIAL + 6] = -0.1 * many.material[3 * MATERIAL + 5];
+  check_alone(many, many.population("auto", 1e-5));
+}
+
+TEST("robots whose joints are driven in other ways share no pack; a motion that is given is kept") {
+  const Many many(4, 2);
+  Population population = many.population("implicit", 1e-5);
+  Inputs given = population.drives[0];
+  given.joints[0].motion = {Segment{0.0, {0.0, 0.1, 0.0, 0.0, 0.0, 0.0}, 0.02, 8.0, 0.0}};
+  given.joints[0].prescribed = given.joints[1].prescribed = true;  // the second has no motion
+  population.drives.push_back(given), population.drive_of = {0, 1, 0, 1};
+  check_alone(many, population);
+  const Results out = results(population, 1);
+  for (std::size_t row = 0; row < out.times; ++row) {
+    const double t = population.times[row];
+    CHECK_NEAR(out.at(0, 1, row), 0.1 * t + 0.02 * std::sin(8.0 * t), 1e-15);
+  }
+  CHECK(out.at(1, 1, 10) != 0.0);
+}
+
+TEST("robots start where they are told, all alike or each by itself") {
+  const Many many(3, 2);
+  const Population own = many.population("implicit", 1e-5);
+  const std::size_t n = std::size_t(assemble(robot_of(own.robots, 0)).n);
+  const Results still = results(own, 1);
+  auto started = [&](std::size_t q, std::size_t v, double at) {
+    Population out = own;
+    out.q.assign(q, 0.0), out.v.assign(v, 0.0);
+    if (q > n) out.q[n] = at;
+    if (v > 0) out.v[0] = at;
+    return results(out, 1);
+  };
+  for (std::size_t size : {n, 3 * n})
+    for (int k = 0; k < 3; ++k) CHECK(same(started(size, n, 0.0), k, still, k));
+  const Results moved = started(3 * n, 0, 0.1), struck = started(0, n, 0.1);
+  CHECK(moved.at(0, 1, 0) == 0.1 && same(moved, 0, still, 0) && same(moved, 2, still, 2));
+  CHECK_NEAR(moved.at(0, 1, 10) - still.at(0, 1, 10), 0.1, 1e-4);  // the rail is level
+  CHECK_NEAR(struck.at(0, 1, 1) - still.at(0, 1, 1), 0.1 * own.times[1], 1e-5);
+  for (const auto &sizes : {std::pair(n - 1, n), std::pair(2 * n, n), std::pair(n, n + 1)}) {
+    bool refused = false;
+    try {
+      started(sizes.first, sizes.second, 0.0);
+    } catch (const std::invalid_argument &) {
+      refused = true;
+    }
+    CHECK(refused);
+  }
+}
+
+TEST("a population that is stopped in a run ends there, alone and in a pack") {
+  Many many(4, 2);
+  for (bool alone : {true, false}) {
+    many.pushed = alone;
+    Population population = many.population(alone ? "explicit" : "auto", 1e-9);
+    if (!alone) population.rtol = 1e-5;
+    for (double &t : population.times) t *= 1e4;
+    std::atomic<bool> stop{false};
+    population.drives[0].function = [&](double, const double *, const double *, double *) {
+      stop = true;
+    };
+    std::vector<double> values(population.channels.size() * 4 * population.times.size());
+    std::atomic<long> done{0};
+    const auto endings = run(population, 1, values.data(), stop, done);
+    for (const Ending &ending : endings) {
+      CHECK(ending.status == (alone ? Status::running : Status::interrupted));
+      CHECK((ending.steps > 0) == alone && ending.reached < population.times[1]);
+    }
+    CHECK(std::isnan(values[0]) != alone && std::isnan(values[1]));
+  }
+}
+
+TEST("sharp tolerances of stiff robots, and a slider on a sleeve: each as it runs alone") {
+  Many stiff(2, 2);
+  for (int k = 0; k < 2; ++k) stiff.material[std::size_t(k) * MATERIAL + 5] = 1e9;
+  check_alone(stiff, stiff.population("auto", 1e-10));
+  Many riding(5, 2);
+  riding.counts = {2, 0, 4, 2, 1, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0};
+  for (int k = 0; k < 5; ++k) {
+    riding.material[std::size_t(k) * MATERIAL + 1] = riding.number(k, 0, 0) = 0.5;
+    riding.number(k, 0, 1) = riding.number(k, 0, 2) = riding.number(k, 0, 3) = 0.0;
+    riding.number(k, 0, 7) = 0.4, riding.number(k, 0, 8) = 0.1;  // start, mass of the sleeve
+    riding.number(k, 1, 0) = 0.1, riding.number(k, 1, 1) = 0.2, riding.number(k, 1, 2) = 0.05,
+                        riding.number(k, 1, 3) = 1e-4, riding.number(k, 1, 7) = 0.3;
+  }
+  const Population population = riding.population("auto", 1e-4);
+  check_alone(riding, population);
+  for (const Ending &ending : results(population, 1).endings) CHECK(ending.status == Status::done);
+}
+
+TEST("robots that get stuck or diverge in a pack end as they do alone") {
+  const Many many(4, 2);
+  for (double at : {0.02, 0.15})
+    for (double force : {1e200, 1e308})
+      for (const char *method : {"implicit", "auto"}) {
+        Population population = many.population(method, 1e-5);
+        Inputs jumps = population.drives[0];
+        if (at < 0.1) jumps.joints[0].force.pop_back();
+        jumps.joints[0].force.push_back(Segment{at, {force, 0, 0, 0, 0, 0}, 0, 0, 0});
+        population.drives.push_back(jumps), population.drive_of = {0, 1, 0, 1};
+        check_alone(many, population);
+        const Results out = results(population, 1);
+        CHECK(out.endings[0].status == Status::done);
+        CHECK(out.endings[1].status == Status::stuck || out.endings[1].status == Status::diverged);
+        CHECK(out.endings[1].reached >= at - 1e-9 && out.endings[1].reached < at + 0.05);
+      }
+}
+
+TEST("a robot that gets stuck at a force without bound leaves its neighbours in a pack alone") {
+  const Many many(4, 2);
+  Population population = many.population("implicit", 1e-5);
+  Inputs steep = population.drives[0];
+  steep.function = [](double, const double *q, const double *, double *force) {
+    force[0] = 1.0 / std::pow(0.01 - q[0], 3);
+  };
+  population.drives.push_back(steep), population.drive_of = {0, 1, 0, 1};
+  check_alone(many, population);
+  const Results out = results(population, 1);
+  CHECK(out.endings[0].status == Status::done && out.endings[1].status == Status::stuck);
+  CHECK(out.endings[1].position[0] < 0.01);
 }

@@ -255,3 +255,59 @@ TEST("a robot without elastic unknowns, and one without load, are where they are
   CHECK(equilibrium(soft, z.data()).balance == Balance::stable);
   for (double value : z) CHECK(value == 0.0);
 }
+
+TEST("loads beyond all measure: missing, not found by chance") {
+  const Model<double> model = cantilever(8);
+  TipLoad load;
+  load.force[1] = 1e14;
+  Numbers q(model.n, 0.0);
+  const Equilibrium far = equilibrium(model, q.data(), load);
+  CHECK(far.balance == Balance::missing && far.share == 0.0);
+  for (double value : q) CHECK(value == 0.0);
+  const char free[1] = {1};
+  load.force[1] = std::nan("");
+  CHECK(equilibrium(model, q.data(), load, free).balance == Balance::missing);
+}
+
+TEST("a pendulum that stands on its head is unstable, to the bit; beside it, it falls") {
+  Robot robot;
+  robot.gravity[0] = -9.81;  // towards the joint
+  Link rod;
+  rod.length = 1.0, rod.mass = 1.0, rod.centre = 0.5, rod.inertia = 0.1;
+  robot.links = {rod};
+  const Model<double> model = assemble(robot);
+  const char free[1] = {1};
+  Numbers q(model.n, 0.0);
+  CHECK(equilibrium(model, q.data(), {}, free).balance == Balance::unstable && q[0] == 0.0);
+  q[0] = 1e-3;
+  CHECK(equilibrium(model, q.data(), {}, free).balance == Balance::stable);
+  CHECK_NEAR(std::fabs(q[0]), pi, 1e-9);
+}
+
+TEST("a strip drawn far: the first integral of the elastica, at any force") {
+  for (double P : {100.0, 1e3, 1e4}) {
+    const Model<double> model = cantilever(64);
+    TipLoad load;
+    load.force[1] = P;
+    Numbers q(model.n, 0.0);
+    const Equilibrium found = equilibrium(model, q.data(), load);
+    CHECK(found.balance == Balance::stable);
+    // far from the clamp the strip is straight: its tip is 1 - (2 - sqrt 2) / sqrt P away from it
+    CHECK_NEAR(found.tip.y, 1.0 - (2.0 - std::sqrt(2.0)) / std::sqrt(P), 1e-3);
+    CHECK_NEAR(found.tip.t, 0.5 * pi, 1e-3);
+  }
+}
+
+TEST(
+    "a load that takes many Newton steps: what is found is in balance, a search from there stays") {
+  const Model<double> model = cantilever(4);
+  TipLoad load;
+  load.force[1] = 1e5, load.moment = 50.0;
+  Numbers q(model.n, 0.0);
+  const Equilibrium found = equilibrium(model, q.data(), load);
+  CHECK(found.balance == Balance::stable && found.sweeps > 20);
+  const Numbers there = q;
+  const Equilibrium again = equilibrium(model, q.data(), load);
+  CHECK(again.balance == Balance::stable && again.sweeps <= 2);
+  for (std::size_t i = 0; i < q.size(); ++i) CHECK_NEAR(q[i], there[i], 1e-9);
+}

@@ -3,6 +3,7 @@
 #include "statics_and_modes/natural_modes.hpp"
 
 #include "check.hpp"
+#include "dynamics/inverse_dynamics.hpp"
 #include "dynamics/piece/mass_proportional_damping.hpp"
 #include "dynamics/places/energies.hpp"
 #include "link/assembly.hpp"
@@ -43,6 +44,7 @@ Robot mixed() {
   sleeved.joint.kind = JointKind::sleeve, sleeved.joint.angle = -0.6, sleeved.joint.start = 0.4,
   sleeved.joint.hub_mass = 0.1;
   few.modes = 2, few.beta = 1e-3, few.joint.viscous = 0.02;
+  slender.lumps = {{0.2, 0.05, 1e-4}};
   rigid.length = 0.2, rigid.mass = 0.3, rigid.centre = 0.1, rigid.inertia = 1e-3;
   robot.links = {slender, rider, sleeved, rigid, few};
   robot.payload_mass = 0.1, robot.payload_inertia = 1e-4;
@@ -304,6 +306,33 @@ TEST("the lowest 20 of many: as from the matrices; two equal arms; rigid motions
       CHECK_NEAR(worst, 0.0, 1e-5);
       CHECK(lowest_modes(model, q.data(), free, 20, {}, false).squares == some.squares);
     }
+  robot.gravity[1] =
+      0.0;  // along x, and loads that are next to none but keep joints from being free
+  for (int by = 0; by < 4; ++by) {
+    robot.gravity[0] = by == 0 ? 1e-12 : 0.0;
+    TipLoad load;
+    if (by < 3)
+      load.force[by % 2] = by == 0 ? 0.0 : 1e-12;
+    else
+      load.moment = 1e-12;
+    const Model<double> model = assemble(robot);
+    const Numbers q(model.n, 0.0);
+    const NaturalModes some = lowest_modes(model, q.data(), frees[1], 10, load),
+                       all = natural_modes(model, q.data(), frees[1], 0, load);
+    CHECK(some.count == 10);
+    for (int k = 0; k < some.count; ++k)
+      CHECK_NEAR(some.squares[k], all.squares[k],
+                 1e-9 * std::fabs(all.squares[k]) + 1e-7 * std::fabs(all.squares[4]));
+  }
+  robot.gravity[0] = 0.0;
+  {  // more than there are
+    const Model<double> model = cantilever(45);
+    const Numbers q(model.n, 0.0);
+    const NaturalModes some = lowest_modes(model, q.data(), nullptr, 1000, {}),
+                       all = natural_modes(model, q.data(), nullptr, 0);
+    CHECK(some.count <= all.count && some.count > 30);
+    for (int k = 0; k < 30; ++k) CHECK_NEAR(some.squares[k] / all.squares[k], 1.0, 1e-8);
+  }
   robot.links.assign(8, strip(0.5, 0.4, 10.0, 15));
   for (double gravity :
        {-1e-12, 0.0}) {  // eight squares are 0, or so near to it that a search meets one of them
@@ -333,7 +362,7 @@ TEST(
     "a free slider, or many of the modes: from the matrices, to the same squares as in the "
     "search") {
   Robot robot;
-  robot.links = {strip(1.0, 0.5, 20.0, 30), strip(0.8, 0.4, 10.0, 30)};
+  robot.links = {strip(1.0, 0.5, 20.0, 30), strip(0.8, 0.4, 10.0, 40)};
   robot.links[1].joint.hub_mass = 0.3, robot.payload_mass = 0.2;
   const char turns[2] = {0, 1}, none[2] = {0, 0};
   for (bool slides : {false, true}) {
@@ -384,6 +413,39 @@ TEST(
   }
   const Linear held = linearise(model, q.data(), zero.data(), hold.data(), free);
   for (int j = 0; j < n; ++j) CHECK(held.by_force[j] == 0.0 && held.by_position[j] == 0.0);
+}
+
+TEST("a sleeved link cut into alike parts has the numbers of one, at any free length") {
+  check::Random random;
+  Robot whole;
+  whole.gravity[0] = 1.0, whole.gravity[1] = -6.0, whole.payload_mass = 0.1;
+  Link base = strip(0.5, 0.4, 2.0, 2), sleeved = strip(0.6, 0.3, 1.5, 3);
+  sleeved.joint.kind = JointKind::sleeve, sleeved.joint.start = 0.4, sleeved.alpha = 0.3;
+  sleeved.material[0].mass[1] = -0.1, sleeved.material[0].stiffness[1] = -0.5;  // tapered
+  whole.links = {base, sleeved};
+  Robot cut = whole;
+  Interval &first = cut.links[1].material[0], second = first, third = first;
+  first.to = second.from = 0.22, second.to = third.from = 0.37;
+  for (Interval *part : {&second, &third}) {
+    part->mass[0] += part->from * part->mass[1];
+    part->stiffness[0] += part->from * part->stiffness[1];
+  }
+  cut.links[1].material = {first, second, third};
+  const Model<double> one = assemble(whole), three = assemble(cut);
+  CHECK(one.n == three.n);
+  for (int k = 0; k < 10; ++k) {
+    Numbers q = bent(one, 0.5, random), v = bent(one, 1.0, random), a = bent(one, 1.0, random);
+    q[one.first[1]] = random(0.1, 0.55);
+    Numbers f(one.n), g(one.n), M(one.n * one.n), N(M);
+    Workspace<double> work(one), other(three);
+    forces(one, work, q.data(), v.data(), a.data(), Terms{}, f.data());
+    forces(three, other, q.data(), v.data(), a.data(), Terms{}, g.data());
+    for (int i = 0; i < one.n; ++i) CHECK_NEAR(f[i], g[i], 1e-12);
+    mass_matrix(one, q.data(), M.data()), mass_matrix(three, q.data(), N.data());
+    for (int i = 0; i < one.n * one.n; ++i) CHECK_NEAR(M[i], N[i], 1e-13);
+    CHECK_NEAR(energies(one, work, q.data(), v.data()).potential,
+               energies(three, other, q.data(), v.data()).potential, 1e-13);
+  }
 }
 
 TEST("numbers that are none end every search") {
