@@ -15,8 +15,7 @@ inline void add_sleeve_damping(const Piece<Real> &c, const Real &alpha, const Re
   for (int k = 0; k < m; ++k) tip += c.tip_angle[k] * rate[k];
   for (int p = 0; p < P + last; ++p) {  // the last: the payload at the tip
     const bool end = p == P;
-    const Real mu =
-        end ? c.payload : free_length_material(c, d, p).mass * d * c.weight[p];
+    const Real mu = end ? c.payload : free_length_material(c, d, p).mass * d * c.weight[p];
     const Real *C = end ? c.w : c.C + p * P;
     Real lever[Free::most], deflection = 0.0;
     for (int k = 0; k < m; ++k) {
