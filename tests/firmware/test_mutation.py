@@ -51,7 +51,7 @@ def test_each_equivalent_mutant_is_one_of_the_sources():
 
 @pytest.mark.long
 @pytest.mark.timeout(7200)
-@pytest.mark.parametrize("name", mutation.BOARD)
+@pytest.mark.parametrize("name", mutation.NAMES)
 def test_nine_of_ten_mutants_are_noticed(name, capsys):
     with capsys.disabled():
         done = mutation.run(name)
