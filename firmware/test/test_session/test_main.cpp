@@ -155,6 +155,12 @@ static void each_refusal_has_its_reason_and_leaves_no_trace() {
   uint16_t sequence;
   CHECK(found(value, sequence, answer, answer_size) && value.item == 3 && sequence == 11);
   CHECK(value.value == rig.config().values[3]);
+  const uint8_t others[] = {4, kConfigItems, 204};
+  for (const uint8_t other_item : others) {  // the number counts, not what the frame says
+    send(session, ConfigRead::kCode, 11, &other_item, 1);
+    CHECK(found(value, sequence, answer, answer_size) && value.item == 3);
+    CHECK(value.value == rig.config().values[3]);
+  }
   item = kConfigItems;
   send(session, ConfigRead::kCode, 12, &item, 1);
   CHECK(acknowledged(ConfigRead::kCode, 12, Result::out_of_range));

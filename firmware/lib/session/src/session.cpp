@@ -135,8 +135,7 @@ uint8_t Session::repeat(uint8_t *frame) {
   if (receiver_.code() != ack_.command || saving_) return 0;
   uint8_t size = 0;
   const bool read = receiver_.code() == ConfigRead::kCode;
-  if (read && ack_.result == static_cast<uint8_t>(Result::ok))
-    size = value(receiver_.fields()[0], frame);
+  if (read && ack_.result == static_cast<uint8_t>(Result::ok)) size = value(read_, frame);
   if (receiver_.code() == ProgramRead::kCode) size = program(frame);
   return static_cast<uint8_t>(size + encode(receiver_.sequence(), ack_, frame + size));
 }
@@ -163,6 +162,7 @@ uint8_t Session::hello(uint8_t *frame) {
 uint8_t Session::config_read(uint8_t *frame) {
   const uint8_t item = receiver_.fields()[0];
   if (item >= kConfigItems) return answer(Result::out_of_range, 0, frame);
+  read_ = item;
   const uint8_t size = value(item, frame);
   return static_cast<uint8_t>(size + answer(Result::ok, 0, frame + size));
 }

@@ -54,6 +54,7 @@ class Session {
   bool save_begun_ = false;
   uint16_t last_ = 0;  // sequence number of the last command obeyed
   Ack ack_ = {};       // and its answer
+  uint8_t read_ = 0;   // the item that was read last
   uint16_t reports_ = 0;
 };
 
