@@ -102,9 +102,7 @@ def silent(noise: Callable[[Rigged], bytes]) -> Callable[[str], Row]:
                 r.back_and_forth(duration_s=1.0)
             )  # all of it fits the look-ahead twice over: no underrun comes first
             board = r.board
-            while board.simulator.unsent:
-                board.wait(0.00025)
-            board.wait(0.002)  # the last word is heard and obeyed
+            r.link.command("keepalive")  # the last word, wherever those before it fell
             caused, asked = r.cycle, board.now()
             while r.driven:
                 board.write(noise(r))
