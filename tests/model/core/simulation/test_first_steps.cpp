@@ -5,23 +5,9 @@
 
 #include "check.hpp"
 #include "plants.hpp"
+#include "sprung.hpp"
 
 using namespace flexura;
-
-namespace {
-
-Segment constant(double t0, double value) {
-  return {t0, {value, 0.0, 0.0, 0.0, 0.0, 0.0}, 0.0, 0.0, 0.0};
-}
-
-// A joint and an elastic unknown, uncoupled: the joint has a spring of 9 and a damper.
-Masses<double> sprung(double elastic, double damping = 0.0) {
-  Masses<double> plant(1, 1);
-  plant.stiffness = {9.0, elastic}, plant.viscous[0] = damping;
-  return plant;
-}
-
-}  // namespace
 
 TEST("what needs no trial: rigid robots, sharp tolerances, strong dampers") {
   struct {

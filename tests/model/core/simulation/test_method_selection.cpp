@@ -11,14 +11,11 @@
 #include "integration/time_loop.hpp"
 #include "plants.hpp"
 #include "simulation/method_selection.hpp"
+#include "sprung.hpp"
 
 using namespace flexura;
 
 namespace {
-
-Segment constant(double t0, double value) {
-  return {t0, {value, 0.0, 0.0, 0.0, 0.0, 0.0}, 0.0, 0.0, 0.0};
-}
 
 std::vector<double> grid(double end, int rows) {
   std::vector<double> t;
@@ -71,13 +68,6 @@ struct Held : Sampler {
     held.force[0] = t < from ? before : after;
   }
 };
-
-// A joint and an elastic unknown, uncoupled: the joint has a spring of 9 and a damper.
-Masses<double> sprung(double elastic, double damping = 0.0) {
-  Masses<double> plant(1, 1);
-  plant.stiffness = {9.0, elastic}, plant.viscous[0] = damping;
-  return plant;
-}
 
 }  // namespace
 
