@@ -28,19 +28,8 @@ def random_state(
     return q, qd
 
 
-def by_one_unit(rng: np.random.Generator, *states: np.ndarray) -> list[np.ndarray]:
-    """The same numbers, each with its last place moved by one unit up or down."""
-    way = lambda x: np.where(rng.random(len(x)) < 0.5, -np.inf, np.inf)
-    return [np.nextafter(x, way(x)) for x in states]
-
-
 def faults(sys: fx.System, rng: np.random.Generator) -> list[str]:
-    """What is wrong at a random state: nothing, one hopes.
-
-    The residual of a row is at most 1e-12 of its terms, or no more than it moves where the last
-    places of q and q' move by four units. The rows of a sleeve's last shapes need the latter: their
-    terms are sums that nearly vanish.
-    """
+    """What is wrong at a random state: nothing, one hopes."""
     q, qd = random_state(sys, rng)
     M, out = sys.mass(q), []
     scale = np.sqrt(np.diag(M))
@@ -57,20 +46,11 @@ def faults(sys: fx.System, rng: np.random.Generator) -> list[str]:
     force = np.zeros(sys.n)
     force[sys.joint_rows] = rng.normal(size=len(sys.joint_rows)) * (M @ np.abs(qd))[sys.joint_rows]
     a = sys.accelerations(q, qd, force)
-
-    def residual(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        terms = (sys.bias(q, qd), sys.elastic(q), sys.gravity(q), sys.damping_at(q) @ qd, -force)
-        M = sys.mass(q)
-        return M @ a + sum(terms), np.abs(M) @ np.abs(a) + sum(np.abs(x) for x in terms)
-
-    left, size = residual(q, qd)
-    size = np.where(size > 0, size, 1.0)
-    share = np.abs(left / size)
+    terms = (sys.bias(q, qd), sys.elastic(q), sys.gravity(q), sys.damping_at(q) @ qd, -force)
+    residual = M @ a + sum(terms)
+    size = np.abs(M) @ np.abs(a) + sum(np.abs(x) for x in terms)
+    share = np.abs(residual / np.where(size > 0, size, 1.0))
     share[sys.joint_rows[sys.locked]] = 0.0  # these rows have the reactions
-    row = int(np.argmax(share))
-    if not share[row] <= 1e-12:
-        own = np.random.default_rng(0)
-        moved = [residual(*by_one_unit(own, q, qd))[0][row] - left[row] for _ in range(20)]
-        if not share[row] <= 4.0 * max(np.abs(moved)) / size[row]:
-            out.append(f"residual {share[row]:.1e} in {sys.labels[row]}")
+    if not share.max() <= 1e-12:
+        out.append(f"residual {share.max():.1e} in {sys.labels[np.argmax(share)]}")
     return out
