@@ -11,7 +11,15 @@ import numpy as np
 
 from ..robot import Link, Payload
 from .modes import ClampedBody, clamped_matrices, clamped_modes, orthogonal_shapes
-from .quadrature import collocation, gauss, lagrange, lagrange_integrals, legendre, legendre_at
+from .quadrature import (
+    collocation,
+    gauss,
+    lagrange,
+    lagrange_integrals,
+    legendre,
+    legendre_at,
+    without_round_off,
+)
 from .section import Material, material
 from .shapes import ElementShapes, MeshShapes, WholeShapes
 
@@ -143,9 +151,7 @@ class Piece:
     @cached_property
     def unit_stiffness(self) -> np.ndarray:
         """K of (35) for d = EI = 1 (m, m), without round-off between orthogonal shapes."""
-        K = self.slopes.T @ (self.weights[:, None] * self.slopes)
-        size = np.sqrt(np.diag(K))
-        return np.where(np.abs(K) < 1e-14 * np.outer(size, size), 0.0, K)
+        return without_round_off(self.slopes.T @ (self.weights[:, None] * self.slopes))
 
     @cached_property
     def w(self) -> np.ndarray:

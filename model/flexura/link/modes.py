@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .quadrature import gauss, lagrange_integrals
+from .quadrature import gauss, lagrange_integrals, without_round_off
 from .section import Material
 from .shapes import legendre_shapes
 
@@ -108,8 +108,7 @@ def orthogonal_shapes(K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     from scipy.linalg import solve_triangular
 
-    size = np.sqrt(np.diag(K))
-    L = np.linalg.cholesky(np.where(np.abs(K) < 1e-14 * np.outer(size, size), 0.0, K))
+    L = np.linalg.cholesky(without_round_off(K))
     return solve_triangular(L.T, np.diag(np.diag(L))), np.diag(L) ** 2
 
 

@@ -30,6 +30,15 @@ def cells(breaks: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     return (breaks[:-1, None] + widths * xi).ravel(), (widths * w).ravel()
 
 
+def without_round_off(K: np.ndarray) -> np.ndarray:
+    """A matrix of sums over points without what they leave between shapes that are orthogonal.
+
+    Times the deflection of the lowest shapes it would be more than the highest ones carry.
+    """
+    size = np.sqrt(np.diag(K))
+    return np.where(np.abs(K) < 1e-14 * np.outer(size, size), 0.0, K)
+
+
 def legendre(count: int, xi: np.ndarray, derivative: int = 0) -> np.ndarray:
     """Legendre's P_0 ... P_(count-1) at u = 2 xi - 1, or their derivatives by u.
 

@@ -79,9 +79,9 @@ class Material:
         return tuple([polyder(rows.T, k) for k in range(3)] for rows in (self.mass, self.stiffness))  # type: ignore[return-value]
 
     def _values(self, powers: np.ndarray, s: ArrayLike) -> np.ndarray:
-        s = np.atleast_1d(np.asarray(s, dtype=float))
+        s = np.atleast_1d(np.asarray(s)) * 1.0
         if self.uniform:
-            return np.full(s.shape, powers[0, 0])
+            return np.full(s.shape, powers[0, 0], s.dtype)
         k = np.clip(np.searchsorted(self.breaks, s, side="right") - 1, 0, powers.shape[1] - 1)
         x, value = s - self.breaks[k], powers[-1, k]
         for row in powers[-2::-1]:

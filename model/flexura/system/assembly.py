@@ -40,7 +40,8 @@ class Terms(NamedTuple):
 
 class Assembly:
     """Lagrange's equations (24) as dense sums over the pieces: the theory written down, which a
-    `System` serves with its arguments checked. q and qd (n,) are named by `labels`.
+    `System` serves with its arguments checked. q and qd (n,) are named by `labels`. The sums have
+    the precision of q and qd: with `np.longdouble` they are a reference for others in double.
 
     A `Structure` in place of a robot brings its own shapes, so that two programs can use one set.
     """
@@ -109,7 +110,7 @@ class Assembly:
         self, states: list[LinkState], gravity: complex = 0j
     ) -> tuple[masses.Sum, np.ndarray]:
         """What (40) to (42) sum over, and the flow terms of (37) (n,)."""
-        parts, flow = [], np.zeros(self.n)
+        parts, flow = [], np.zeros_like(states[0].q)
         for state in states:
             own = self.structure.masses(state)
             parts += own
@@ -150,7 +151,7 @@ class Assembly:
         Returns:
             (n, n).
         """
-        K = self._diagonal.copy()
+        K = self._diagonal.astype(q.dtype)
         for i in self._sleeved:
             own = self.structure.own[i][0]
             K[own, own] = self._sleeve(i, q)
@@ -172,7 +173,7 @@ class Assembly:
     def _sleeve(self, i: int, q: np.ndarray, derivative: int = 0) -> np.ndarray:
         """K(d) of the link i in a sleeve, or its derivatives by d (35)."""
         return sleeve.stiffness(
-            self.structure.links[i][0], float(q[self.rows[i]]), self._sleeved[i], derivative
+            self.structure.links[i][0], q[self.rows[i]], self._sleeved[i], derivative
         )
 
     def stiffness(self, q: np.ndarray) -> np.ndarray:
@@ -206,7 +207,7 @@ class Assembly:
         return self._damping(self.stiffness_blocks(q), q)
 
     def _damping(self, K: np.ndarray, q: np.ndarray) -> np.ndarray:
-        D = np.zeros((self.n, self.n))
+        D = np.zeros((self.n, self.n), q.dtype)
         for i, (link, row) in enumerate(zip(self.robot.links, self.rows, strict=True)):
             D[row, row] = link.joint.viscous_friction
             if i in self.structure.windups:
@@ -415,11 +416,11 @@ class Assembly:
         )
 
     def _at_rest(self, q: np.ndarray) -> list[LinkState]:
-        return self.structure.states(q, np.zeros(self.n))
+        return self.structure.states(q, np.zeros_like(q))
 
     def _clamped_mass(self, i: int, q: np.ndarray) -> np.ndarray:
         """M (n, n) of link i alone, straight and clamped, with the payload of the last one (26)."""
-        straight, still = np.zeros(self.n), np.zeros(self.n)
+        straight, still = np.zeros_like(q), np.zeros_like(q)
         straight[self.rows[i]] = q[self.rows[i]]
-        state = self.structure.link(i, base(self.n), straight, still)
+        state = self.structure.link(i, base(self.n, q.dtype), straight, still)
         return masses.total(self.structure.own_masses(state)).mass

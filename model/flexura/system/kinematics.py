@@ -6,10 +6,10 @@ n unknowns; P points of a line. Equations: docs/theory/01-kinematics.md.
 
 from __future__ import annotations
 
-import cmath
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ..link.line import Piece
 
@@ -29,14 +29,15 @@ class Frame(NamedTuple):
     rest_turning: float = 0.0
 
     @property
-    def tangent(self) -> complex:
-        """The unit vector along the frame's x axis."""
-        return cmath.exp(1j * self.angle)
+    def tangent(self) -> Any:
+        """The unit vector along the frame's x axis, a complex number."""
+        return np.exp(1j * self.angle)
 
 
-def base(n: int) -> Frame:
-    """The frame of the base, which stands still."""
-    return Frame(0j, 0.0, np.zeros(n, dtype=complex), np.zeros(n))
+def base(n: int, kind: DTypeLike = float) -> Frame:
+    """The frame of the base, which stands still; all that is built on it has numbers of this
+    kind."""
+    return Frame(0j, 0.0, np.zeros(n, np.result_type(kind, complex)), np.zeros(n, kind))
 
 
 def rotate(frame: Frame, angle: float, row: int | None = None) -> Frame:
@@ -45,19 +46,19 @@ def rotate(frame: Frame, angle: float, row: int | None = None) -> Frame:
     if row is not None:
         turning = turning.copy()
         turning[row] += 1.0
-    return frame._replace(angle=frame.angle + float(angle), turning=turning)
+    return frame._replace(angle=frame.angle + angle, turning=turning)
 
 
 def translate(frame: Frame, x: complex, rows: list[int], qd: np.ndarray) -> Frame:
     """The frame moved by x [m] along its x axis (by the imaginary part of x across it); the
     unknowns `rows` are summands of x."""
-    t, spin = frame.tangent, float(frame.turning @ qd)
+    t, spin = frame.tangent, frame.turning @ qd
     velocity = frame.velocity + (1j * x * t) * frame.turning
     for row in rows:
         velocity[row] += t
-    rate = float(sum(qd[row] for row in rows))
+    rate = sum(qd[row] for row in rows)
     rest = frame.rest + x * t * (1j * frame.rest_turning - spin**2) + 2j * t * spin * rate
-    return frame._replace(place=frame.place + x * t, velocity=velocity, rest=complex(rest))
+    return frame._replace(place=frame.place + x * t, velocity=velocity, rest=rest)
 
 
 class Line(NamedTuple):
@@ -83,9 +84,9 @@ class Line(NamedTuple):
     qd: np.ndarray
 
     @property
-    def rate(self) -> float:
+    def rate(self) -> Any:
         """d', the rate of the free length [m/s]."""
-        return 0.0 if self.row is None else float(self.qd[self.row])
+        return 0.0 if self.row is None else self.qd[self.row]
 
 
 def line(
@@ -102,7 +103,7 @@ def line(
     """The line of a piece that begins at `start`: a point on a bent link is the integral of its
     tangents (3), (5). With `linear` (7) it is on the hub's frame `axis`."""
     bent, bending = piece.B @ q[own], piece.B @ qd[own]
-    spin = float(start.turning @ qd)
+    spin = start.turning @ qd
     if not linear:
         e = np.exp(1j * (start.angle + bent))
         turn, left = spin + bending, 1j * e
@@ -110,7 +111,7 @@ def line(
         E[:, own] += left[:, None] * piece.B
         N = e * (1j * start.rest_turning - turn**2)
         return Line(piece, start, own, free, row, e, E, left * turn, N, q, qd)
-    t, hub = axis.tangent, float(axis.turning @ qd)
+    t, hub = axis.tangent, axis.turning @ qd
     e = t + 1j * t * (start.angle - axis.angle + bent)
     E = (1j * e)[:, None] * axis.turning
     E[:, own] += 1j * t * piece.B
@@ -130,25 +131,25 @@ def station(line: Line, xi: float, slider: int | None = None) -> Frame:
     """
     d, start, y = line.free, line.start, line.q[line.own]
     w, l, dl, b, db, ddb = line.piece.tip if xi == 1.0 else line.piece.at(xi)
-    reach = complex(w @ line.e)
+    reach = w @ line.e
     velocity, turning = start.velocity + d * (w @ line.E), start.turning.copy()
     turning[line.own] += b
-    rest, rest_turning = start.rest + d * complex(w @ line.N), start.rest_turning
+    rest, rest_turning = start.rest + d * (w @ line.N), start.rest_turning
     moved = [] if slider is None else [(slider, 1.0)]
     if line.row is not None:
         velocity[line.row] += reach
-        rest += 2 * line.rate * complex(w @ line.rates)
+        rest += 2 * line.rate * (w @ line.rates)
         moved += [(line.row, 1.0 - xi)] if xi < 1.0 else []
     if moved:
-        tangent, curvature = complex(l @ line.e), float(db @ y) / d
+        tangent, curvature = l @ line.e, db @ y / d
         for row, share in moved:
             velocity[row] += share * tangent
             turning[row] += share * curvature
-        run = sum(share * float(line.qd[row]) for row, share in moved) / d
-        rest += d * run * (2 * complex(l @ line.rates) + run * complex(dl @ line.e))
+        run = sum(share * line.qd[row] for row, share in moved) / d
+        rest += d * run * (2 * (l @ line.rates) + run * (dl @ line.e))
         rest_turning += run * (
-            2 * float(db @ line.qd[line.own]) + run * float(ddb @ y) - 2 * line.rate * curvature
+            2 * (db @ line.qd[line.own]) + run * (ddb @ y) - 2 * line.rate * curvature
         )
     return Frame(
-        start.place + d * reach, start.angle + float(b @ y), velocity, turning, rest, rest_turning
+        start.place + d * reach, start.angle + b @ y, velocity, turning, rest, rest_turning
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..link.line import Piece
+from ..link.quadrature import without_round_off
 from ..link.section import Material
 from .kinematics import Frame, Line
 from .masses import Masses, Part, dot, point_mass
@@ -17,7 +18,7 @@ def masses(line: Line, material: Material) -> list[Part]:
         free_masses(line, material),
         rod_behind(line.start, line.free, line.row, material, line.qd),
     )
-    missed = float(line.piece.mass.sum() - free.mass.sum() - rod.mass.sum())
+    missed = line.piece.mass.sum() - free.mass.sum() - rod.mass.sum()
     return [free, rod, point_mass(missed, line.start)]
 
 
@@ -46,10 +47,10 @@ def flow_forces(line: Line, material: Material, free: Masses) -> np.ndarray:
         mu_d = mu_d - d * behind * line.piece.weights * material.mass_per_length(
             material.length - d * behind, 1
         )
-    exit_density = float(material.mass_per_length(material.length - d)[0])
+    exit_density = material.mass_per_length(material.length - d)[0]
     out = d_rate * (dot(free.columns, mu_d * V) - dot(line.E, left * V))
     out -= exit_density * d_rate**2 * np.real(start.velocity.conj() * start.tangent)
-    out[row] += float(np.real(np.sum(left * line.rates.conj() * V)) - 0.5 * mu_d @ np.abs(V) ** 2)
+    out[row] += np.real(np.sum(left * line.rates.conj() * V)) - 0.5 * mu_d @ np.abs(V) ** 2
     out[row] -= 0.5 * exit_density * d_rate**2
     return out
 
@@ -57,12 +58,10 @@ def flow_forces(line: Line, material: Material, free: Masses) -> np.ndarray:
 def rod_behind(start: Frame, free: float, row: int, material: Material, qd: np.ndarray) -> Masses:
     """The masses of the straight rod inside and behind the sleeve, on its axis (34)."""
     s, ds = material.quadrature(0.0, material.length - free, 4)
-    t, spin, x = start.tangent, float(start.turning @ qd), s - material.length + free
+    t, spin, x = start.tangent, start.turning @ qd, s - material.length + free
     columns = start.velocity + (1j * t * x)[:, None] * start.turning
     columns[:, row] += t
-    rest = (
-        start.rest + 2j * t * spin * float(qd[row]) + x * (t * (1j * start.rest_turning - spin**2))
-    )
+    rest = start.rest + 2j * t * spin * qd[row] + x * (t * (1j * start.rest_turning - spin**2))
     return Masses(material.mass_per_length(s) * ds, start.place + t * x, columns, rest)
 
 
@@ -80,4 +79,5 @@ def stiffness(piece: Piece, d: float, material: Material, derivative: int = 0) -
         factor += left * material.bending_stiffness(X, 1) * (-1 / d, 2 / d**2)[derivative - 1]
     if derivative > 1:
         factor += left**2 / d * material.bending_stiffness(X, 2)
-    return piece.slopes.T @ ((factor * piece.weights)[:, None] * piece.slopes)
+    K = piece.slopes.T @ ((factor * piece.weights)[:, None] * piece.slopes)
+    return K if derivative else without_round_off(K)

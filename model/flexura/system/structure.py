@@ -133,7 +133,7 @@ class Structure:
     def _hub(self, i: int, before: LinkState | None, q: np.ndarray, qd: np.ndarray) -> Frame:
         """The frame of link i's hub (Pb: of the sleeve's exit) on the link before it (1), (30)."""
         joint, row = self.robot.links[i].joint, self.rows[i]
-        tip = before.tip if before else base(self.n)
+        tip = before.tip if before else base(self.n, q.dtype)
         if joint.type == "R":
             hub = rotate(tip, q[row], row)
             if i in self.windups:  # (109)

@@ -46,7 +46,11 @@ def faults(sys: fx.System, rng: np.random.Generator) -> list[str]:
     force = np.zeros(sys.n)
     force[sys.joint_rows] = rng.normal(size=len(sys.joint_rows)) * (M @ np.abs(qd))[sys.joint_rows]
     a = sys.accelerations(q, qd, force)
-    terms = (sys.bias(q, qd), sys.elastic(q), sys.gravity(q), sys.damping_at(q) @ qd, -force)
+    # in extended precision: in double the assembly's own round-off is up to 1e-11 of a row
+    dense, at, rates = sys.assembly, q.astype(np.longdouble), qd.astype(np.longdouble)
+    damping = dense.damping(at) @ rates
+    terms = (dense.bias(at, rates), dense.elastic(at), dense.gravity(at), damping, -force)
+    M = dense.mass(at)
     residual = M @ a + sum(terms)
     size = np.abs(M) @ np.abs(a) + sum(np.abs(x) for x in terms)
     share = np.abs(residual / np.where(size > 0, size, 1.0))
