@@ -26,7 +26,7 @@ from ..tuning.objective import Weights
 from ..tuning.search import Search, search
 from ..tuning.task import Task, perturbed_robots
 from .options import Json
-from .output import message, print_results
+from .output import message, print_results, warn
 from .results import continued, replacing
 
 
@@ -179,12 +179,13 @@ def tune(
         _bar(how.generations + how.polish, task.objectives) as report,
     ):
         complete = search(task, how, runs, history, report)
-    if not len(history):
-        raise typer.Exit(130)
+    if not len(history):  # nothing to show
+        raise KeyboardInterrupt
     found = results.result(task, how, history, complete)
     on_board = not isinstance(given, Designed) and set(given.settings) <= set(BOARD)
     _stored(found, folder, None if on_board else f"{robot} {manoeuvre}", json)
     if not complete:
+        warn(f"interrupted after generation {len(history)}: the same command goes on in {folder}")
         raise typer.Exit(130)
 
 
@@ -276,10 +277,9 @@ def _cases(
         found, complete = cases.study(["IV", "III"], how, folder, scheduler, jobs, report)
     if found:
         print_results(json, lambda: cases.table(found), lambda: cases.data(found))
-    message(
-        json, f"stored {folder}" + ("" if complete else "; interrupted: the same command goes on")
-    )
+    message(json, f"stored {folder}")
     if not complete:
+        warn(f"interrupted: the same command goes on in {folder}")
         raise typer.Exit(130)
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 import flexura as fx
+from flexura.errors import OutOfMemory
 
 from .rows import rows, values
 
@@ -62,6 +63,8 @@ def refined(
             break
         try:
             finer = simulated(share * _step(fine))
+        except OutOfMemory:
+            raise
         except fx.FlexuraError:
             break
         if not finer.complete or _step(finer) >= 0.9 * _step(fine):
@@ -94,6 +97,8 @@ def _other(twin: fx.Run, simulated: Callable[[float], fx.Run]) -> fx.Run | None:
     for factor in (2.0, 0.5):
         try:
             run = simulated(factor * _step(twin))
+        except OutOfMemory:
+            raise
         except fx.FlexuraError:
             continue
         if run.complete and not 0.7 < _step(run) / _step(twin) < 1.4:

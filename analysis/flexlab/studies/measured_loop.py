@@ -121,7 +121,8 @@ class _Filter:
 def _strain_by_deflection(robot: fx.Robot) -> float:
     """Strain of the gauge by tip deflection, of a strip that swings in its first mode [1/m]."""
     t = np.linspace(0.0, 2.0, 501)
-    run = fx.simulate(robot, t, fx.Drive.prescribed(signals.cycloid(0.3, 0.4)))
+    swing = fx.Drive.prescribed(signals.cycloid(0.3, 0.4))
+    run = fx.simulate(robot, t, swing).uninterrupted()
     w, strain = run["link/1/tip_deflection"], run[GAUGE]
     return float(strain @ w / (w @ w))
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 import flexura as fx
+from flexura.errors import OutOfMemory
 from flexura.signals import Manoeuvre
 
 POOL_PAYS_S = (
@@ -150,6 +151,8 @@ def _row(work: _Work) -> Row:
             loads=case.manoeuvre.loads,
             payloads=case.manoeuvre.payloads,
         ).uninterrupted()
+    except OutOfMemory:
+        raise
     except fx.FlexuraError as error:
         return row | {"complete": False, "error": str(error)}
     later = run.t >= case.from_s - 1e-9

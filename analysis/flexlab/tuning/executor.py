@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from types import TracebackType
 from typing import Any, Protocol
@@ -13,6 +12,7 @@ import numpy as np
 from flexura.errors import FlexuraError, InputError
 from flexura.optional import load
 from flexura.population import cores, program
+from flexura.threads import Threads
 
 from .task import Task
 
@@ -47,13 +47,11 @@ class ThreadExecutor:
 
     def __init__(self, task: Task, threads: int) -> None:
         self.task, self.sweeps, self.stopped = task, task.gain_sweeps(), threading.Event()
-        self.pool = ThreadPoolExecutor(threads)
+        self.pool = Threads(threads)
 
     def __call__(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Evaluator`."""
-        return _concatenated(
-            list(self.pool.map(self._chunk, _chunks(points, 1), _chunks(limits, 1)))
-        )
+        return _concatenated(self.pool.each(self._chunk, _chunks(points, 1), _chunks(limits, 1)))
 
     def _chunk(self, points: np.ndarray, limits: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         if self.stopped.is_set():

@@ -149,7 +149,8 @@ def tune_lqr_baseline(
         return None
     values = settings(designs.free, history.all("points")[history.best][None])[0]
     controller = designs.controller(values)
-    run = fx.simulate(fx.assemble(structure.robot), structure.manoeuvre.t, controller, rtol=RTOL)
+    system, t = fx.assemble(structure.robot), structure.manoeuvre.t
+    run = fx.simulate(system, t, controller, rtol=RTOL).uninterrupted()
     run.meta["manoeuvre"] = structure.manoeuvre.name
     run.save(folder / "best", overwrite=True)
     weights = {f.name: float(v) for f, v in zip(designs.free, values, strict=True)}

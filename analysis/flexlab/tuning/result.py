@@ -91,12 +91,13 @@ def simulate_tuned(
     if isinstance(gains, Designed):
         refs = references(system, asked)
         law = gains.sampled(system.robot if nominal is None else nominal, refs)
-        run = with_references(fx.simulate(system, asked.t, law, rtol=RTOL, **acts), refs)
+        run = fx.simulate(system, asked.t, law, rtol=RTOL, **acts).uninterrupted()
+        run = with_references(run, refs)
         run.meta["manoeuvre"] = asked.name
         r = [run[f"joint/{i}/reference"] for i in range(1, len(refs) + 1)]
         return run, step_response(run, r, gains.limits(len(refs)), settled)
     controller = closed_loop_controller(system, asked, gains)
-    run = fx.simulate(system, asked.t, controller, rtol=RTOL, **acts)
+    run = fx.simulate(system, asked.t, controller, rtol=RTOL, **acts).uninterrupted()
     run.meta["manoeuvre"] = asked.name
     return run, metrics(run, controller, settled)
 
@@ -171,7 +172,7 @@ def table(found: TuningResult) -> Table:
         f"{sum(history.wall_s):.3g} s; seed {found.how.seed}"
     )
     if not found.complete:
-        out.notes.append("interrupted: the same command goes on")
+        out.notes.append("interrupted")
     if len(task.robots) > 1:
         out.notes.append(f"worst of {len(task.robots)} robots")
     out.notes.append(

@@ -186,7 +186,7 @@ class Loop {
     c.wish = c.step < c.wish ? std::fmax(c.wish, wish) : wish;
     c.before = std::fmax(e, 1e-4);
     set_lane(good, k, 1.0);
-    if (c.steps + c.rejected >= most_steps) c.status = Status::exhausted;
+    if (c.next < c.end && c.steps + c.rejected >= most_steps) c.status = Status::exhausted;
   }
 
   void reject(Method<Real> &method, int k, double e) {

@@ -7,7 +7,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -25,6 +25,7 @@ from ..optional import Optional
 from ..robot import Robot
 from ..signals import Drive, LoadsLike, PayloadsLike, acts
 from ..simulation.problem import Budget
+from ..threads import Threads
 from . import dask_cluster, worker
 from .batch import Batch, Share
 from .request import Request, units_of
@@ -353,14 +354,14 @@ def _local(
     timer = Timer(max(late - time.perf_counter(), 0.0), watch.stop) if late < math.inf else None
     waiting: deque[tuple[worker.Work | range, Future[worker.Part] | None]] = deque()
 
-    def finished() -> Chunk | range:
+    def finished(pool: Threads) -> Chunk | range:
         work, part = waiting.popleft()
         if isinstance(work, range):
             return work
         assert part is not None
-        return worker.chunk_of(request, *work, part.result())
+        return worker.chunk_of(request, *work, pool.result(part))
 
-    with ThreadPoolExecutor(1) as pool:
+    with Threads(1) as pool:
         try:
             if timer is not None:
                 timer.start()
@@ -372,12 +373,12 @@ def _local(
                 )
                 waiting.append((work, part))
                 while len(waiting) > 2:
-                    made = finished()
+                    made = finished(pool)
                     if watch.stopped:
                         return
                     yield made
             while waiting:
-                made = finished()
+                made = finished(pool)
                 if watch.stopped:
                     return
                 yield made

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +23,7 @@ from ..simulation.start import (
     limit_error,
 )
 from ..system import NoEquilibrium, System, equilibrium
+from ..threads import Threads
 from .batch import Share
 from .request import Request, check_drive
 from .rows import ELEMENTS, START, Rows
@@ -156,8 +156,8 @@ def _starts(
         except InputError as error:
             return str(error)
 
-    with ThreadPoolExecutor(threads) as pool:
-        found = dict(zip(which, pool.map(start, map(int, which)), strict=True))
+    with Threads(threads) as pool:
+        found = dict(zip(which, pool.each(start, map(int, which)), strict=True))
     for j, why in found.items():
         if isinstance(why, str):
             part.status[members[j]], part.events[members[j]] = "refused", why
@@ -317,8 +317,8 @@ def _one_by_one(request: Request, share: Share, threads: int, watch: Any, part: 
         if not watch.stopped:
             _alone(request, share, k, part)
 
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(work, range(len(share))))
+    with Threads(threads) as pool:
+        pool.each(work, range(len(share)))
 
 
 def _alone(request: Request, share: Share, k: int, part: Part) -> None:

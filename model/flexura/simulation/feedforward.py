@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..errors import FlexuraError
 from ..signals import Signal, table
 from ..system import System
 from .dynamics import inverse
@@ -45,6 +46,12 @@ def inverse_dynamics(
 
     Returns:
         One Signal a joint [N or N m].
+
+    Raises:
+        FlexuraError: the robot can't follow them to their end.
     """
-    run = inverse(system, t_s, motions, rtol=rtol)
+    run = inverse(system, t_s, motions, rtol=rtol).uninterrupted()
+    if not run.complete:
+        said = "; ".join(str(event["text"]) for event in run.meta["events"])
+        raise FlexuraError(f"the motion was not followed to its end: {said}")
     return [table(run.t, run[f"joint/{i}/drive"]) for i in range(1, len(motions) + 1)]

@@ -57,6 +57,7 @@ class Program:
             "MPLCONFIGDIR": str(folder / "matplotlib"),
             "OPENBLAS_NUM_THREADS": "1",
             "COLUMNS": "160",
+            "PYTHONFAULTHANDLER": "1",
         }
         self.process = subprocess.Popen(
             [sys.executable, str(HERE / "server.py")],

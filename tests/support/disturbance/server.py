@@ -11,9 +11,11 @@ import json
 import os
 import resource
 import signal
+import subprocess
 import sys
 import time
 import traceback
+from functools import cache
 from typing import Any
 
 import typer
@@ -41,14 +43,26 @@ def main() -> None:
                 importlib.import_module(name)
             for name in cli.COMMANDS:
                 group.get_command(None, name)
+        spared = iterator_buffers() if asked.get("kind") == "array" else (0, 0)
         # a command gets no signal before it begins
         signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
         child = os.fork()
         if child:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
         else:
-            _run(cli, shim, asked)
+            _run(cli, shim, asked, spared)
         print(json.dumps(_watched(child, asked)), flush=True)
+
+
+@cache
+def iterator_buffers() -> tuple[int, int]:
+    """Place and size of NumPy's function that takes the buffers of iterators: where one is refused,
+    NumPy 2.4 raises MemoryError without the interpreter's lock, and the process ends."""
+    library = importlib.import_module("numpy._core._multiarray_umath").__file__
+    assert library is not None
+    listed = subprocess.run(["nm", "-S", library], capture_output=True, text=True, check=True)
+    rows = [row.split() for row in listed.stdout.splitlines() if "npyiter_allocate_buffers" in row]
+    return int(rows[0][0], 16), int(rows[0][1], 16)
 
 
 def _watched(child: int, asked: dict[str, Any]) -> dict[str, Any]:
@@ -74,7 +88,7 @@ def _watched(child: int, asked: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _run(cli: Any, shim: Any, asked: dict[str, Any]) -> None:
+def _run(cli: Any, shim: Any, asked: dict[str, Any], spared: tuple[int, int]) -> None:
     """The command, in the child, which ends with its status."""
     os.chdir(asked["cwd"])
     for handle, name in ((1, "out"), (2, "err")):
@@ -89,8 +103,8 @@ def _run(cli: Any, shim: Any, asked: dict[str, Any]) -> None:
         sys.argv = ["flexura", *asked["arguments"]]
         kind, n = KINDS.get(asked.get("kind", ""), 0), asked.get("n", 0)
         if kind in (5, 6):
-            size = ctypes.c_size_t(asked.get("bytes", 0))
-            assert shim.disturb_memory(asked["library"].encode(), kind, ctypes.c_long(n), size)
+            sizes = map(ctypes.c_size_t, (asked.get("bytes", 0), *spared))
+            assert shim.disturb_memory(asked["library"].encode(), kind, ctypes.c_long(n), *sizes)
         else:
             log = asked.get("log", "").encode()
             shim.disturb_files(asked["cwd"].encode(), kind, ctypes.c_long(n), log)

@@ -30,7 +30,7 @@ size_t folder_size;
 std::atomic<int> kind{none};
 std::atomic<long> countdown{0}, counted{0}, fired{0};
 int log_file = -1;
-uintptr_t library_begin, library_end;
+uintptr_t library_begin, library_end, spared_begin, spared_end;
 size_t least_bytes;
 
 template <class Function>
@@ -143,7 +143,7 @@ int synchronised(int file, const char *name) {
 
 bool of_library(void *caller) {
   auto at = reinterpret_cast<uintptr_t>(caller);
-  return at >= library_begin && at < library_end;
+  return at >= library_begin && at < library_end && !(at >= spared_begin && at < spared_end);
 }
 
 bool refused(void *caller, size_t size, Kind what) {
@@ -166,7 +166,8 @@ void disturb_files(const char *below_this, int what, long n, const char *log) {
 }
 
 // Fail the n-th allocation of at least so many bytes by a library that is loaded; 0: not found.
-int disturb_memory(const char *name, int what, long n, size_t bytes) {
+// Those of one function, `spared` bytes from `at` in the library, are left alone.
+int disturb_memory(const char *name, int what, long n, size_t bytes, size_t at, size_t spared) {
   FILE *maps = fopen("/proc/self/maps", "r");
   char line[8192];
   library_begin = library_end = 0;
@@ -179,6 +180,7 @@ int disturb_memory(const char *name, int what, long n, size_t bytes) {
   }
   if (maps) fclose(maps);
   least_bytes = bytes;
+  spared_begin = library_begin + at, spared_end = spared_begin + spared;
   counted = fired = 0;
   countdown = n;
   kind = what;

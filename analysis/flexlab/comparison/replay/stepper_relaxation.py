@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import flexura as fx
-from flexura.errors import FlexuraError
+from flexura.errors import FlexuraError, OutOfMemory
 from flexura.signals import JointDrive, Signal, table
 
 from ...rig.plant.stepper import MagneticSpring
@@ -113,6 +113,8 @@ def simulate_with_stepper(
                 rtol=rtol,
                 method=method,
             ).uninterrupted()
+        except OutOfMemory:
+            raise
         except FlexuraError:  # what was assumed has grown beyond all bounds
             break
         # the last row of an incomplete run is at the instant of its end

@@ -96,8 +96,8 @@ class Experiment:
             own = {key: value for key, value in acting.items() if not of_channel(key)[0]}
             made = robot.replace(self.starts(robot) | own)
             drive = self._drive(made, acting)
-            run = fx.simulate(fx.assemble(made), t, drive, rtol=RTOL)
-            self._cache[key] = run.uninterrupted()
+            run = fx.simulate(fx.assemble(made), t, drive, rtol=RTOL).uninterrupted()
+            self._cache[key] = run
         return self._cache[key]
 
     def starts(self, robot: fx.Robot) -> dict[str, float]:

@@ -88,7 +88,7 @@ def bang_bang(task: Task) -> Motion:
         ends = zip(task.start, task.end, strict=True)
         joints = tuple(trapezoidal(b, duration, duration / 2, a) for a, b in ends)
         t = duration * (np.arange(HOLDS) + 0.5) / HOLDS
-        run = fx.inverse(task.rigid, t, list(joints))
+        run = fx.inverse(task.rigid, t, list(joints)).uninterrupted()
         return joints, t, np.array([run[f"joint/{i}/drive"] for i in (1, 2)])
 
     most = (1 - LEFT) * task.limits

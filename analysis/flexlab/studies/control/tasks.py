@@ -70,7 +70,7 @@ class Task:
     def limits(self) -> np.ndarray:
         """Of the drives (2,) [N or N m]: more than the rigid robot needs on the set-points."""
         t = np.linspace(0.0, self.duration_s, 201)
-        run = fx.inverse(self.rigid, t, list(self.set_points))
+        run = fx.inverse(self.rigid, t, list(self.set_points)).uninterrupted()
         return ROOM * np.array([np.abs(run[f"joint/{i}/drive"]).max() for i in (1, 2)])
 
     @cached_property

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import FlexuraError
+from ...errors import FlexuraError, OutOfMemory
 from ...signals import COLUMNS, Signal
 from ...system import System
 from ..dynamics import inverse
@@ -148,7 +148,10 @@ def _tried(
         for row, locked in zip(p, system.locked, strict=True)
     ]
     try:
-        run = inverse(system, np.append(splines.nodes[0], t), signals, rtol=RTOL)
+        times = np.append(splines.nodes[0], t)
+        run = inverse(system, times, signals, rtol=RTOL).uninterrupted()
+    except OutOfMemory:
+        raise
     except FlexuraError:
         return np.inf, np.zeros(0)
     if len(run) <= len(t) or run.states is None:

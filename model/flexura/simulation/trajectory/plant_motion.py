@@ -145,8 +145,8 @@ def answer(
     nodes, fine = np.linspace(0.0, T, m + 1), np.linspace(0.0, T, substeps * m + 1)
     t = stage_times(fine)
     drive = Drive.force(*(linear_drive(nodes, column) for column in u.T))
-    run = simulate(system, np.append(0.0, t), drive, plant.start, rtol=RTOL, method=METHOD)
-    run.uninterrupted()
+    times = np.append(0.0, t)
+    run = simulate(system, times, drive, plant.start, rtol=RTOL, method=METHOD).uninterrupted()
     if len(run) <= len(t) or run.states is None or not np.isfinite(run.states).all():
         return None
     n, rows = system.n, system.free_rows

@@ -221,7 +221,7 @@ def _smooth(plant: Plant, T: float, m: int) -> Run:
         None if locked else polynomial(float(b), T, float(a))
         for a, b, locked in zip(plant.start[rows], plant.end[rows], system.locked, strict=True)
     ]
-    return inverse(system, np.linspace(0.0, T, m + 1), motion, rtol=1e-6)
+    return inverse(system, np.linspace(0.0, T, m + 1), motion, rtol=1e-6).uninterrupted()
 
 
 def _smooth_drives(plant: Plant, T: float, m: int) -> np.ndarray:
@@ -259,8 +259,8 @@ def _unshaped(system: System, start: np.ndarray, end: np.ndarray, limits: Limits
     values[:, free[0]] = [most, most, -most, -most, 0.0]
     drive = Drive.force(*(linear_drive(times, column) for column in values.T))
     later = span + np.linspace(h, PERIODS * 2 * np.pi / omega, 400)
-    run = simulate(system, np.append(0.0, later), drive, plant.start, rtol=RTOL, method=METHOD)
-    run.uninterrupted()
+    times = np.append(0.0, later)
+    run = simulate(system, times, drive, plant.start, rtol=RTOL, method=METHOD).uninterrupted()
     return np.asarray(np.abs(_bends(run, plant)[1:]).max(axis=0))
 
 
@@ -279,8 +279,10 @@ def _drive(u: np.ndarray, T: float) -> Drive:
 def _simulated(plant: Plant, u: np.ndarray, T: float) -> Run:
     """The motion under drives (m + 1, links), with `ROWS` rows in each interval."""
     rows = np.linspace(0.0, T, ROWS * (len(u) - 1) + 1)
-    run = simulate(plant.system, rows, _drive(u, T), plant.start, rtol=RTOL, method=METHOD)
-    return run.uninterrupted()
+    drive = _drive(u, T)
+    return simulate(
+        plant.system, rows, drive, plant.start, rtol=RTOL, method=METHOD
+    ).uninterrupted()
 
 
 def _recorded(plants: list[Plant], u: np.ndarray, T: float, count: int, share: float) -> Run:
@@ -304,6 +306,7 @@ def _residual(plant: Plant, drive: Drive, T: float) -> float:
         return 0.0
     span = PERIODS * 2 * np.pi / plant.modes[0][plant.joints]
     later = np.concatenate([[0.0], T + np.linspace(0.0, span, 400)])
-    after = simulate(plant.system, later, drive, plant.start, rtol=RTOL, method=METHOD)
-    after.uninterrupted()
+    after = simulate(
+        plant.system, later, drive, plant.start, rtol=RTOL, method=METHOD
+    ).uninterrupted()
     return float(np.abs(_bends(after, plant)[1:]).max())

@@ -213,7 +213,7 @@ def deviation(
     and the tip's reach [m].
     """
     times = np.concatenate([mesh.nodes[:1], mesh.t, mesh.nodes[-1:]])
-    run = inverse(judge, times, _motions(judge, signals), rtol=RTOL)
+    run = inverse(judge, times, _motions(judge, signals), rtol=RTOL).uninterrupted()
     if len(run) < len(times):
         raise FlexuraError(f"the run under the inverse motion ended early: {run.meta['events']}")
     tips = np.column_stack([run["tip/x"], run["tip/y"]])
