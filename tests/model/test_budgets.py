@@ -40,6 +40,17 @@ def test_a_larger_budget_changes_no_digit():
 
 
 @pytest.mark.parametrize("stiffening", [True, False])
+def test_the_last_step_of_a_budget_may_be_the_last_of_the_run(stiffening):
+    made = FAST.replace({"stiffening": stiffening})
+    t, keys = np.linspace(0.0, 1e-2, 11), {"start": "straight", "method": "explicit"}
+    run = fx.simulate(made, t, **keys)
+    taken = run.meta["steps"] + run.meta.get("rejected", 0)
+    last, one_less = (fx.simulate(made, t, max_steps=taken - k, **keys) for k in (0, 1))
+    assert last.complete and np.array_equal(last["tip/y"], run["tip/y"])
+    assert not one_less.complete and event(one_less, "exhausted")["t"] < t[-1]
+
+
+@pytest.mark.parametrize("stiffening", [True, False])
 def test_wall_time_stops_and_labels(stiffening):
     made = FAST.replace({"stiffening": stiffening})
     t = np.linspace(0.0, 1000.0, 11)

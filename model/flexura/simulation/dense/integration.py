@@ -254,7 +254,8 @@ class Integration:
                 return ()
             self.steps += 1
             over = "exhausted" if self.steps >= self.budget.steps else "wall_time"
-            if over == "exhausted" or time.perf_counter() > self.late:
+            late = over == "exhausted" or time.perf_counter() > self.late
+            if late and solver.t < self.t[-1]:
                 told = self.budget.event(over, self.now, self.method, self.steps, float(self.t[0]))
                 self.events.append(told)
                 return ()
