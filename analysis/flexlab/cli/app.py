@@ -8,8 +8,10 @@ import errno
 import gc
 import importlib
 import keyword
+import signal
 import sys
 import threading
+from types import FrameType
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -79,8 +81,10 @@ class Commands(TyperGroup):
             return super().main(*args, **keys)
         except SystemExit as end:
             # typer ends an interrupt so, without a word
-            if isinstance(getattr(end.__context__, "__cause__", None), KeyboardInterrupt):
+            told = isinstance(getattr(end.__context__, "__cause__", None), KeyboardInterrupt)
+            if told or (end.code == 1 and _interrupted.is_set()):
                 typer.echo("flexura: interrupted", err=True)
+                sys.exit(130)
             raise
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -137,6 +141,8 @@ def main() -> None:
     # looking for garbage among a million objects just imported is a tenth of the start
     gc.set_threshold(100_000)
     sys.unraisablehook = _unraisable
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _interrupt)
     try:
         app()
     except KeyboardInterrupt:
@@ -152,9 +158,20 @@ def main() -> None:
         if isinstance(error, MemoryError) or any(text in str(error) for text in SHORT_OF_MEMORY):
             _end_without_memory(error)
         if not isinstance(error, FlexuraError):
-            raise
+            if not _interrupted.is_set():
+                raise
+            typer.echo("flexura: interrupted", err=True)
+            sys.exit(130)
         typer.echo(f"flexura: {error}", err=True)
         sys.exit(2 if isinstance(error, InputError) else 1)
+
+
+_interrupted = threading.Event()  # compiled libraries turn Ctrl-C into errors of their own
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    _interrupted.set()
+    signal.default_int_handler(number, frame)
 
 
 def _unraisable(what: Any) -> None:

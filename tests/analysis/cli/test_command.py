@@ -457,3 +457,26 @@ def test_doctor_has_status_0_where_nothing_is_missing(tmp_path):
     assert done.returncode == (1 if missing else 0) and all(finding["cost"] for finding in missing)
     assert found["Python"]["state"] == found["numpy"]["state"] == found["pyarrow"]["state"] == "ok"
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("becomes", ["SystemError('of a library')", "typer.Exit(1)"])
+def test_an_interrupt_that_a_library_turns_into_an_error(becomes):
+    """Compiled libraries do so while they are imported; `doctor` then finds them missing."""
+    code = f"""if True:
+        import os, signal, sys, time, typer
+        import flexlab.cli.robots as command
+        from flexlab.cli import app
+
+        def robots():
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(60)
+            except KeyboardInterrupt:
+                raise {becomes}
+
+        command.robots = robots
+        sys.argv = ["flexura", "robots"]
+        app.main()
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "flexura: interrupted\n")
