@@ -98,6 +98,7 @@ def test_a_name_that_looks_like_a_seal_does_no_harm(tmp_path):
     assert fx.Run.read(tmp_path).meta == made.meta
 
 
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize(
     "every",
     [pytest.param(211, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.long)],

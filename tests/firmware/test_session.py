@@ -95,7 +95,9 @@ def test_a_stop_goes_out_of_turn_then_in_turn_and_nothing_that_waited_is_sent():
 
 def test_numbers_follow_each_other_and_begin_again_after_the_last(monkeypatch):
     monkeypatch.setattr(random.SystemRandom, "randrange", lambda self, end: end - 1)
-    link = Link(Line())
+    line = Line()
+    line.emulated = False
+    link = Link(line)
     for number in (0xFFFF, 0):
         asked = link.submit("stop")
         link.poll()
@@ -103,6 +105,14 @@ def test_numbers_follow_each_other_and_begin_again_after_the_last(monkeypatch):
         link.board.acknowledge("stop", number)
         link.poll()
         assert asked.done and asked.sequence == number
+
+
+def test_a_session_with_an_emulated_board_is_the_same_each_time():
+    links = [Link(Line()) for _ in range(2)]
+    for link in links:
+        link.submit("stop")
+        link.poll()
+    assert [link.board.said for link in links] == [[(1.0, "stop", 1)]] * 2
 
 
 def test_a_command_that_waits_has_no_number_time_or_answer():

@@ -212,11 +212,7 @@ def conduct(
     """
     check(plan)
     recording = Recording(folder, session(setup, plan, opened, sensor), replace=replace)
-    # The same experiment on the emulated board is the same byte for byte; a real line needs a
-    # number that nobody played before.
-    link = Link(
-        RecordingBoard(opened.board, recording), sequence=1 if opened.board.emulated else None
-    )
+    link = Link(RecordingBoard(opened.board, recording))
     try:
         findings = _ready(
             link,

@@ -228,7 +228,7 @@ class Loop {
   void finish(int k) {
     RunState &c = run_state[k];
     while (c.row < count()) keep(k, c.t, integration.z.data());
-    if (c.running()) c.status = Status::done;
+    c.status = Status::done;
   }
 
   // The state at time t inside the step just attempted, into row_state; prescribed joints are on

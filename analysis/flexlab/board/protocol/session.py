@@ -102,8 +102,9 @@ class Counts:
 
 @dataclass
 class Link:
-    """A session with a board. `sequence` starts the count; without one it is chosen at random, as
-    the protocol asks. A command is repeated after the measured round trip, until one is measured
+    """A session with a board. `sequence` starts the count; without one it is chosen at random, a
+    number that nobody played before, as the protocol asks; on an emulated board it is 1, so that
+    the same session is the same byte for byte. A command is repeated after the measured round trip, until one is measured
     and at most after `repeat_s`; the host gives up `answer_s` after its first attempt."""
 
     board: Board
@@ -118,9 +119,8 @@ class Link:
         self._deframer = Deframer()
         self._waiting: deque[Command] = deque()
         self._now: Command | None = None
-        self._next = (
-            random.SystemRandom().randrange(1 << 16) if self.sequence is None else self.sequence
-        )
+        chosen = 1 if self.board.emulated else random.SystemRandom().randrange(1 << 16)
+        self._next = chosen if self.sequence is None else self.sequence
         self._telemetry: list[bytes] = []
         self._newest = b""
         self._last_report: int | None = None

@@ -399,9 +399,12 @@ TEST("a budget that a rejected step uses up, or the last step of a run") {
   const RunState &took = whole.loop.run_state[0];
   Run exact(plant, acting, grid(0.0, 1.0, 3), 1e-6, true);
   exact.loop.most_steps = took.steps + took.rejected;
-  CHECK(exact({1.0}, {0.0}) == Status::exhausted);
+  CHECK(exact({1.0}, {0.0}) == Status::done);
   CHECK(exact.loop.run_state[0].t == 1.0 && exact.record().rows == 3);
   CHECK(exact.record().state == whole.record().state);
+  Run less(plant, acting, grid(0.0, 1.0, 3), 1e-6, true);
+  less.loop.most_steps = took.steps + took.rejected - 1;
+  CHECK(less({1.0}, {0.0}) == Status::exhausted && less.loop.run_state[0].t < 1.0);
 }
 
 TEST("a joint that leaves from its limit stays there; a run that goes on has the row of a limit") {
