@@ -102,10 +102,13 @@ class Counts:
 
 @dataclass
 class Link:
-    """A session with a board. `sequence` starts the count; without one it is chosen at random, a
-    number that nobody played before, as the protocol asks; on an emulated board it is 1, so that
-    the same session is the same byte for byte. A command is repeated after the measured round trip, until one is measured
-    and at most after `repeat_s`; the host gives up `answer_s` after its first attempt."""
+    """A session with a board.
+
+    `sequence` starts the count; without one it is chosen at random, a number that nobody played
+    before, as the protocol asks; on an emulated board it is 1, so that the same session is the same
+    byte for byte. A command is repeated after the measured round trip, until one is measured and at
+    most after `repeat_s`; the host gives up `answer_s` after its first attempt.
+    """
 
     board: Board
     sequence: int | None = None
