@@ -37,7 +37,7 @@ FLOORS = {
         {"io"},
         {"core"},
         {"optional"},
-        {"errors"},
+        {"errors", "threads"},
     ],
     "flexlab": [
         {"cli", "benchmarks"},
@@ -143,7 +143,7 @@ def test_the_laboratory_uses_the_model_by_its_packages(module):
         used
         for used in homes(module)
         if inside(used, "flexura")
-        and used not in ("flexura.errors", "flexura.optional", "flexura.core")
+        and used not in ("flexura.errors", "flexura.optional", "flexura.core", "flexura.threads")
         and MODULES[used].name != "__init__.py"
     }
     assert deep == set()
