@@ -37,7 +37,8 @@ FLOORS = {
         {"io"},
         {"core"},
         {"optional"},
-        {"errors", "threads"},
+        {"threads"},
+        {"errors"},
     ],
     "flexlab": [
         {"cli", "benchmarks"},

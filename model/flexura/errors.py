@@ -4,6 +4,7 @@ expected, and of numbers that fail."""
 from __future__ import annotations
 
 import functools
+import mmap
 import sys
 import traceback
 from collections.abc import Callable
@@ -82,6 +83,22 @@ def out_of_memory(error: MemoryError) -> OutOfMemory:
             "the process more"
         )
     )
+
+
+def room_for(size: int, what: str) -> None:
+    """Ask for memory and give it back, before what would not survive that there is none.
+
+    Args:
+        size: bytes.
+        what: they are for.
+
+    Raises:
+        MemoryError: there is not enough.
+    """
+    try:
+        mmap.mmap(-1, size).close()
+    except OSError:
+        raise MemoryError(f"{size / 1e6:.0f} MB for {what}") from None
 
 
 class WrongValue(ValueError):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import mmap
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
+
+from .errors import room_for
 
 Result = TypeVar("Result")
 ROOM = 16 << 20  # bytes that a thread takes for its stack and its first objects
@@ -27,10 +28,7 @@ class Threads(ThreadPoolExecutor):
             MemoryError: a thread more does not fit.
         """
         if len(self._threads) < self._max_workers:
-            try:
-                mmap.mmap(-1, ROOM).close()
-            except OSError:
-                raise MemoryError(f"{ROOM / 1e6:.0f} MB for a thread") from None
+            room_for(ROOM, "a thread")
         return super().submit(fn, *args, **kwargs)
 
     def result(self, future: Future[Result]) -> Result:
@@ -48,6 +46,13 @@ class Threads(ThreadPoolExecutor):
         return future.result()
 
     def each(self, function: Callable[..., Result], *columns: Iterable[Any]) -> list[Result]:
-        """What a function returns for each row of the columns, in their order."""
-        futures = [self.submit(function, *row) for row in zip(*columns, strict=True)]
-        return [self.result(future) for future in futures]
+        """What a function returns for each row of the columns, in their order. Where one raises,
+        those that have not begun do not begin."""
+        futures: list[Future[Result]] = []
+        try:
+            for row in zip(*columns, strict=True):
+                futures.append(self.submit(function, *row))
+            return [self.result(future) for future in futures]
+        finally:
+            for future in futures:
+                future.cancel()

@@ -25,6 +25,7 @@ REASONS = {
     "crosscheck/crosscheck.py simulated": "compares the part that both have, and says so",
     "cli/simulate.py _simulate_many": "a population, which keeps what is finished",
     "population/worker.py _alone": "in a thread, which gets no Ctrl-C: a population has a watch",
+    "identification/strip.py _behind_gears": "`simulate` there asks, of both ways",
     "identification/fit/identify_robot.py _unknowns": "one row",
     "identification/fit/identify_robot.py _channels": "one row",
 }

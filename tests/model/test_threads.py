@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from concurrent.futures import Future
 
 import pytest
@@ -45,6 +46,19 @@ def _wait_for(there, job):
     while not there:
         pass
     job()
+
+
+def test_where_one_raises_those_that_wait_do_not_begin():
+    begun = []
+
+    def job(k):
+        begun.append(k)
+        time.sleep(0.05)
+        return 1 / k
+
+    with Threads(1) as pool, pytest.raises(ZeroDivisionError):
+        pool.each(job, range(40))
+    assert len(begun) < 20
 
 
 def test_no_room_for_a_thread():

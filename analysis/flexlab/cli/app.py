@@ -83,8 +83,7 @@ class Commands(TyperGroup):
             # typer ends an interrupt so, without a word
             told = isinstance(getattr(end.__context__, "__cause__", None), KeyboardInterrupt)
             if told or (end.code == 1 and _interrupted.is_set()):
-                typer.echo("flexura: interrupted", err=True)
-                sys.exit(130)
+                _end_interrupted()
             raise
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -146,8 +145,7 @@ def main() -> None:
     try:
         app()
     except KeyboardInterrupt:
-        typer.echo("flexura: interrupted", err=True)
-        sys.exit(130)
+        _end_interrupted()
     except OSError as error:
         if error.errno == errno.ENOMEM:
             _end_without_memory(error)
@@ -160,8 +158,7 @@ def main() -> None:
         if not isinstance(error, FlexuraError):
             if not _interrupted.is_set():
                 raise
-            typer.echo("flexura: interrupted", err=True)
-            sys.exit(130)
+            _end_interrupted()
         typer.echo(f"flexura: {error}", err=True)
         sys.exit(2 if isinstance(error, InputError) else 1)
 
@@ -182,6 +179,11 @@ def _unraisable(what: Any) -> None:
         again.start()
     else:
         sys.__unraisablehook__(what)
+
+
+def _end_interrupted() -> NoReturn:
+    typer.echo("flexura: interrupted", err=True)
+    sys.exit(130)
 
 
 def _end_without_memory(error: Exception) -> NoReturn:

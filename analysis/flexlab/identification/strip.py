@@ -198,9 +198,7 @@ class StripModel:
             )
         q0[system.joint_rows] = [x[0] for x in self._shaft_positions.values()]
         teeth = Backlash(tuple(contacts))
-        return fx.simulate(
-            system, self._times, teeth, q0=q0, rtol=GEAR_RTOL, method=GEAR_METHOD
-        ).uninterrupted()
+        return fx.simulate(system, self._times, teeth, q0=q0, rtol=GEAR_RTOL, method=GEAR_METHOD)
 
     def _with_bearings(self, robot: fx.Robot, friction: float) -> fx.Robot:
         """The robot with its bearings' friction in the joints, times a factor."""

@@ -11,12 +11,11 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-import mmap
 import os
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, room_for
 
 BEGIN, END = b"flexura-seal:", b":flexura-seal"
 DIGITS = 64
@@ -140,10 +139,7 @@ def room_for_arrow(size: int = 0) -> None:
     Raises:
         MemoryError: there is not enough.
     """
-    try:
-        mmap.mmap(-1, ARROW + size).close()  # as Arrow's own pool does, beside that of C
-    except OSError:
-        raise MemoryError(f"{(ARROW + size) / 1e6:.0f} MB for Parquet") from None
+    room_for(ARROW + size, "Parquet")  # by mmap, as Arrow's own pool does, beside that of C
 
 
 def read_table(content: bytes) -> Any:

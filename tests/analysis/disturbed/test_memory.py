@@ -45,6 +45,11 @@ def short_memory(name, place, limits):
     print(f"{name}: {len(limits)} limits, statuses {dict(counts)}")
 
 
+def following(n):
+    """The number of the allocation that fails next, after the n-th."""
+    return n + (1 if n < FIRST else max(1, n // 4))
+
+
 def innermost(said):
     """The function that a process was in when it ended, as Python's fault handler says it."""
     frames = re.findall(r"^  File .* in (\w+)$", said, re.MULTILINE)
@@ -76,7 +81,7 @@ def test_allocations_of_the_core_fail_once(name, place):
             break
         assert ended.status in (0, 1) and (ended.status == 0 or "not enough memory" in ended.err)
         faults += 1
-        n += 1 if n < FIRST else max(1, n // 4)
+        n = following(n)
     print(f"{name}: {faults} allocations of the core failed, {binding} of the binding's")
     assert faults > FIRST or name not in ("simulate", "simulate --vary", "inverse", "tune")
 
@@ -90,7 +95,7 @@ def test_large_arrays_fail_once(name, place):
         command, work = ready(place, name)
         ended = place.run(command, work, kind="array", n=n, library=NUMPY, bytes=16_000)
         if ended.status == -signal.SIGSEGV and innermost(ended.err) == SPARSE:
-            theirs, n = theirs + 1, n + (1 if n < FIRST else max(1, n // 4))
+            theirs, n = theirs + 1, following(n)
             assert theirs <= SPARSE_SLICES
             continue
         ended_well(ended, work)
@@ -98,6 +103,6 @@ def test_large_arrays_fail_once(name, place):
             break
         assert ended.status in (0, 1), ended.err
         faults += 1
-        n += 1 if n < FIRST else max(1, n // 4)
+        n = following(n)
     print(f"{name}: {faults} arrays failed, {theirs} in slices of SciPy's sparse matrices")
     assert faults or name not in ("simulate", "export csv")

@@ -191,7 +191,7 @@ def _setpoints(motions: Sequence[Signal], duration_s: float, settings: dict[str,
 
 def _ready(board: EmulatedBoard, settings: dict[str, float]) -> Link:
     """A session with a board that is configured, has proven its stop and stands at zero."""
-    link = Link(board, sequence=1)
+    link = Link(board)
     link.connect()
     link.write_configuration(settings)
     link.command("clear", fault=link.newest["fault"])

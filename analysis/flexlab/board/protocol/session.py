@@ -122,8 +122,7 @@ class Link:
         self._deframer = Deframer()
         self._waiting: deque[Command] = deque()
         self._now: Command | None = None
-        chosen = 1 if self.board.emulated else random.SystemRandom().randrange(1 << 16)
-        self._next = chosen if self.sequence is None else self.sequence
+        self._next = self._first() if self.sequence is None else self.sequence
         self._telemetry: list[bytes] = []
         self._newest = b""
         self._last_report: int | None = None
@@ -133,6 +132,10 @@ class Link:
         self._answered = (-1, 0.0)  # the last command's number, and how long its answer took
 
     # ---- session
+
+    def _first(self) -> int:
+        """The first number of a session."""
+        return 1 if self.board.emulated else random.SystemRandom().randrange(1 << 16)
 
     def connect(self, timeout_s: float = 5.0) -> Identity:
         """Wait for the board's first good frame, refuse a board of another declaration, open a

@@ -95,9 +95,8 @@ class Experiment:
                 self._cache.pop(next(iter(self._cache)))
             own = {key: value for key, value in acting.items() if not of_channel(key)[0]}
             made = robot.replace(self.starts(robot) | own)
-            drive = self._drive(made, acting)
-            run = fx.simulate(fx.assemble(made), t, drive, rtol=RTOL).uninterrupted()
-            self._cache[key] = run
+            system, drive = fx.assemble(made), self._drive(made, acting)
+            self._cache[key] = fx.simulate(system, t, drive, rtol=RTOL).uninterrupted()
         return self._cache[key]
 
     def starts(self, robot: fx.Robot) -> dict[str, float]:
