@@ -58,8 +58,8 @@ def experiment(
     teeth = figures.stepper.full_steps_per_turn / 4
 
     def drive(t, position, velocity, tip):
-        """The parts' own equations, quasi-static current, tanh friction: nothing is condensed to a
-        line or a spring."""
+        """The parts' own equations, no inductance, tanh friction: nothing is condensed to a line or
+        a spring."""
         u = limited(volts(t, position[0], velocity[0]))
         u = math.copysign(max(abs(u) - more.driver.dead_zone_V, 0.0), u)
         turns = velocity[0] / r
@@ -78,7 +78,12 @@ def experiment(
         detent = more.stepper.detent_torque_N_m * math.sin(4 * teeth * position[1])
         return [torque / r - rail, hold - detent - more.stepper.damping_N_m_s * velocity[1]]
 
-    true = robot(bench, rotor=data.inertia_kg_m2 / r**2, **differs)
+    # what gear and screw lose of the force that accelerates the carriage
+    carried = fx.assemble(robot(bench, rotor=0.0, **differs))
+    lost_kg = carried.mass(carried.start())[0, 0] * (
+        1 / (data.gear_efficiency * figures.screw.efficiency) - 1
+    )
+    true = robot(bench, rotor=data.inertia_kg_m2 / r**2 + lost_kg, **differs)
     t = np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
     moved = twin.simulate(true, t, drive, step_s=1e-3)
     assert moved.complete
@@ -88,9 +93,7 @@ def experiment(
     acting = np.array(
         [limited(volts(*k)) for k in zip(t, x, moved["joint/1/velocity"], strict=True)]
     )
-    late_s = (
-        5e-4 + more.motor.inductance_H / data.resistance_ohm
-    )  # a tick's middle; the current lags
+    late_s = 5e-4  # a tick's middle
     tip = quantised(moved["link/2/tip_deflection"] + rng.normal(0, noise_m, len(t)), 2e-4)
     angle, length = quantised(q, 2 * math.pi / 2400), bench.robot.links[1].length_m
     at = quantised(x, 0.008 / 640)
@@ -134,9 +137,10 @@ def experiment(
 
 
 def as_driven(rig):
-    """The rig's tables as these equations have it: without play, and nothing holds the motor more
-    at rest than when it slides."""
+    """The rig's tables as these equations have it: without play and inductance, and nothing holds
+    the motor more at rest than when it slides."""
     tables = rig.model_dump(mode="json")
+    tables["motor"]["inductance_H"] = 1e-12
     tables["carriage"]["backlash_m"] = 0.0
     tables["motor"]["starts_at_V"] = 0.1
     return tables

@@ -59,7 +59,8 @@ class Nominal:
         The strip shows the friction of a bearing that a gear turns: it is not in these.
         """
         return {
-            axis.number: joint_line(axis, own=0.0 if axis.turns else None) for axis in self.axes
+            axis.number: joint_line(axis, own=0.0 if axis.turns else None, delayed=True)
+            for axis in self.axes
         }
 
 

@@ -5,10 +5,11 @@ While the motor slides one way, from t_1 to t_2, with F_V u the drive of its vol
     m (v_2 - v_1) = int F_V u(t - tau) dt - c (x_2 - x_1) - F_c sign(v) (t_2 - t_1) - int G dt
 
 tau is the time from a voltage's report to its current. On a lead screw the motor turns a reflected
-mass of 100 kg, which the strip hardly moves: m is that of all that the joint carries, as one rigid
-body, and G is 0. A geared motor that turns its joint feels the links swing: m is the rotor's
-inertia, and G is what the motor gives to its gear for the torque T of the identified strip, the
-bearing's friction in it. The gear drives the links with the efficiency eta:
+mass of 100 kg, which the strip hardly moves: m is the rotor's, and that of all that the joint
+carries, as one rigid body, over the screw's and the gear's efficiency; G is 0. A geared motor that
+turns its joint feels the links swing: m is the rotor's inertia, and G is what the motor gives to
+its gear for the torque T of the identified strip, the bearing's friction in it. The gear drives the
+links with the efficiency eta:
 
     G = T / eta     T v > 0,        G = T eta'     else
 
@@ -84,10 +85,10 @@ def fit(
             expected += f"; the run ended early, at {t[-1]:.3g} s"
         raise InputError(expected, key=position, value=int(slides.sum()))
 
-    mass, given = line.inertia, np.zeros(len(t))
     if torque_N_m is None:
-        mass += _carried(robot, axis)
+        mass, given = line.moved(_carried(robot, axis)), np.zeros(len(t))
     else:
+        mass = line.inertia
         given = _given(axis, np.interp(t, experiment.t, torque_N_m), measured)
     size = max(2, round(WINDOW_S / float(np.median(np.diff(t)))))
     first = np.flatnonzero(_whole(slides, np.sign(measured), size))

@@ -46,6 +46,16 @@ static void products_equal_exact_ones() {
   }
 }
 
+static void halves_go_up() {
+  for (uint16_t k = 0; k < 600; ++k) {
+    const int32_t a =
+        k < 49 ? kEdges[k % 7] * 65536L + kEdges[k / 7] : static_cast<int32_t>(random32());
+    if (a <= kInt32Max - 0x8000L)
+      CHECK(nearest(a) == static_cast<int16_t>((static_cast<int64_t>(a) + 0x8000) >> 16));
+  }
+  CHECK(nearest(0x7fff) == 0 && nearest(0x8000) == 1 && nearest(-0x8000L) == 0);
+}
+
 static void sums_equal_exact_ones() {
   for (uint8_t k = 0; k < 200; ++k) {
     const int32_t start = static_cast<int32_t>(random32());
@@ -910,6 +920,7 @@ static void commands_are_obeyed_once_and_in_order() {
 
 static void tests() {
   RUN(products_equal_exact_ones);
+  RUN(halves_go_up);
   RUN(sums_equal_exact_ones);
   RUN(what_is_not_finite_is_no_number);
   RUN(crc_is_the_published_one);

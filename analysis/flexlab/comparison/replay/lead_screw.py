@@ -4,9 +4,9 @@
     s'' = 0                            at rest, if |F| <= f_0, the static friction
     x = min(max(x, s - b/2), s + b/2)  carriage behind the nut, backlash b
 
-F is the voltage's force, m the mass of rotor and carriage. While the nut crosses the backlash, both
-frictions lose the rail's part. The equations are solved exactly over steps of constant F and f
-(`STEP_S`). The encoder sees s.
+F is the voltage's force, m the rotor's reflected mass and what it carries over the efficiency of
+screw and gear. While the nut crosses the backlash, both frictions lose the rail's part. The
+equations are solved exactly over steps of constant F and f (`STEP_S`). The encoder sees s.
 
 Two assumptions: the strip's vibration does not move s (1 N against a rotor of 100 kg), and the rail
 brakes the carriage whenever the nut does not push it (true up to some 2 m/s^2).
@@ -46,7 +46,7 @@ def nut_and_carriage(
         t: evenly spaced times (T,) [s].
         force: the force of the motor's voltage on the nut [N].
         line: joint 1 as a linear motor.
-        mass_kg: all that moves, the rotor's reflected mass included.
+        mass_kg: all that moves at the nut, as `JointLine.moved` has it.
         play_m: backlash from flank to flank [m].
         start_m: position at the start [m].
 

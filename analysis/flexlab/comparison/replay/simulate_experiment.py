@@ -156,14 +156,14 @@ def _by_screw_and_stepper(
     assert rig.stepper is not None
     t = experiment.t
     (axis,) = motor_axes(rig)
-    line = joint_line(axis)
+    line = joint_line(axis, delayed=True)
     robot = with_drives(robot, rig, [(axis, line)])
     pulses, jumps = joint_2_pulse_angle(experiment)
     force = motor_force(experiment, rig, axis, line)
     at_start = (_first_position(experiment, 1), pulses(t[0])[0])
     method = "implicit" if jumps else "auto"  # one every millisecond
     start = _start_at(robot, at_start)
-    mass_kg = float(start[0].mass(start[1])[0, 0])
+    mass_kg = line.moved(float(start[0].mass(start[1])[0, 0]) - line.inertia)
     fine_t = np.arange(t[0], t[-1] + lead_screw.STEP_S, lead_screw.STEP_S)
     nut, speed, x = lead_screw.nut_and_carriage(
         fine_t, force, line, mass_kg, lead_screw.backlash(axis.guide), at_start[0]
@@ -197,7 +197,7 @@ def _by_motors(
     out. The gears' backlash is left out.
     """
     t = experiment.t
-    lines = [(axis, joint_line(axis)) for axis in motor_axes(rig)]
+    lines = [(axis, joint_line(axis, delayed=True)) for axis in motor_axes(rig)]
     robot = with_drives(robot, rig, lines)
     forces = [motor_force(experiment, rig, axis, line) for axis, line in lines]
     at_start = [_first_position(experiment, n) for n in range(1, rig.joints + 1)]

@@ -168,6 +168,7 @@ class JointLine:
     F [N or N m] acts on `inertia` [kg or kg m^2], the rotor's at the joint, and the robot's own.
     Inductance, dead zone and backlash are left out. `static` holds at rest. `guide` is the joint's
     own part of `coulomb` and `static`; it is missing while the motor crosses the backlash.
+    `efficiency` is that of gear and screw.
     """
 
     force_per_V: float
@@ -176,18 +177,37 @@ class JointLine:
     inertia: float
     static: float
     guide: float
+    efficiency: float
+
+    def moved(self, load: float) -> float:
+        """What the motor moves at the joint with a rigid load [kg or kg m^2].
+
+        The motor drives its load against the joint's friction, so that the load's inertia counts
+        1 / efficiency times.
+
+        Args:
+            load: mass or inertia of the load.
+        """
+        return self.inertia + load / self.efficiency
 
 
-def joint_line(axis: MotorAxis, friction: float = 1.0, own: float | None = None) -> JointLine:
+def joint_line(
+    axis: MotorAxis, friction: float = 1.0, own: float | None = None, *, delayed: bool = False
+) -> JointLine:
     """A joint with a motor as a linear motor, from the rig's nominal data.
 
     Force K / (R r), back-EMF K^2 / (R r^2), inertia J / r^2. The motor always drives the joint's
     own friction, which counts 1 / (eta_gear eta_screw) times.
 
+    With an inductance L the current is late by tau = L / R. For motions slower than tau the voltage
+    acts later by tau, and so does the back-EMF c_E v: -c_E v(t - tau) = -c_E v + c_E tau v'. Who
+    delays the voltage by tau sees the inertia J / r^2 - c_E tau.
+
     Args:
         axis: the joint.
         friction: factor on Coulomb and viscous friction, not on the back-EMF.
         own: factor on the joint's own friction; None: the same.
+        delayed: for a voltage that acts later by L / R.
     """
     data, r, guide = motor_data(axis), axis.transmission, axis.guide
     efficiency = data.gear_efficiency * axis.efficiency
@@ -196,11 +216,14 @@ def joint_line(axis: MotorAxis, friction: float = 1.0, own: float | None = None)
     coulomb = friction * (data.friction_N_m + axis.screw_coulomb_N_m) / r + rail
     breakaway = max(data.breakaway_N_m, data.friction_N_m) + axis.screw_coulomb_N_m
     viscous = friction * axis.screw_viscous_N_m_s / r**2 + own * guide.viscous / efficiency
+    back_emf = data.constant_N_m_A**2 / (data.resistance_ohm * r**2)
+    late_s = data.inductance_H / data.resistance_ohm if delayed else 0.0
     return JointLine(
         data.constant_N_m_A / (data.resistance_ohm * r),
-        data.constant_N_m_A**2 / (data.resistance_ohm * r**2) + viscous,
+        back_emf + viscous,
         coulomb,
-        data.inertia_kg_m2 / r**2,
+        data.inertia_kg_m2 / r**2 - back_emf * late_s,
         friction * breakaway / r + rail,
         rail,
+        efficiency,
     )

@@ -40,6 +40,9 @@ inline int32_t to_q8(int32_t whole) {
 inline int16_t upper(int32_t a) { return static_cast<int16_t>(static_cast<uint32_t>(a) >> 16); }
 inline uint16_t lower(int32_t a) { return static_cast<uint16_t>(a); }
 
+// The whole number next to a Q16, halves up. |a| < 2^31 - 2^15.
+inline int16_t nearest(int32_t a) { return upper(a + 0x8000L); }
+
 // 16 x 16 = 32 bits. GCC multiplies 32 by 32 bits here, which takes three times as long. The C++
 // expression after #else is the specification; the unit tests run on both versions.
 #ifdef __AVR__

@@ -138,7 +138,7 @@ void Rig::tick(Outputs &out) {
 int32_t Rig::open_loop(uint8_t joint) const {
   const int16_t asked = static_cast<int16_t>(target_.of[joint]);
   return drive(joint) == Drive::stepper ? multiply_high(kRateOfStep, asked)
-                                        : upper(multiply(fixed_.duty, asked));
+                                        : nearest(multiply(fixed_.duty, asked));
 }
 
 void Rig::control() {
@@ -214,7 +214,7 @@ void Rig::report(Telemetry &report) const {
   for (uint8_t j = 0; j < 2; ++j) {
     const bool motor = drive(j) == Drive::motor;
     const int16_t limit = fixed_.gains[j].limit;
-    voltage[j] = motor ? upper(multiply(fixed_.voltage, output[j])) : int16_t(0);
+    voltage[j] = motor ? nearest(multiply(fixed_.voltage, output[j])) : int16_t(0);
     saturated = saturated || (on && motor && (output[j] >= limit || output[j] <= -limit));
   }
   const bool steps = drive(1) == Drive::stepper;
