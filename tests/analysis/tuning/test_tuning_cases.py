@@ -132,10 +132,13 @@ def test_a_saturated_lqr_on_a_sliding_strip_moves_alike_by_each_method():
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-def test_ga_pso_and_cma_es_reach_the_same_objective_within_2_percent_from_five_seeds():
+def test_no_search_of_five_seeds_stays_2_percent_behind():
+    """No search stays 2 % behind what most reach, and no algorithm behind the others. J has several
+    minima, and a search may find a better one, if it is one with small steps too."""
     whole = cases.type_4().task(2)
     task = replace(whole, manoeuvre=replace(whole.manoeuvre, duration_s=2.5))
-    least = {}
+    exact = replace(task, rtol=1e-6)
+    sweeps, least = exact.gain_sweeps(), {}
     print()
     for seed in range(1, 6):
         for name, population, generations in (("ga", 50, 60), ("pso", 30, 50), ("cma-es", 16, 140)):
@@ -148,7 +151,12 @@ def test_ga_pso_and_cma_es_reach_the_same_objective_within_2_percent_from_five_s
                     history,
                     lambda h: None,
                 )
-            least[name, seed] = history.all("goals").min()
+            goals = history.all("goals")[:, 0]
+            least[name, seed] = goals.min()
+            best = history.all("points")[goals.argmin()][None]
+            assert exact.score(*exact.run(sweeps, best))[0, 0] == pytest.approx(
+                least[name, seed], rel=1e-4
+            )
             wall = time.perf_counter() - begun
             print(
                 f"| {name} | {seed} | {least[name, seed]:.5f} | {history.evaluations} | {wall:.1f} "
@@ -156,7 +164,12 @@ def test_ga_pso_and_cma_es_reach_the_same_objective_within_2_percent_from_five_s
                 flush=True,
             )
     values = np.array(list(least.values()))
-    assert values.max() <= 1.02 * values.min(), least
+    assert values.max() <= 1.02 * np.median(values), least
+    middles = [
+        np.median([J for (of, _), J in least.items() if of == name])
+        for name in ("ga", "pso", "cma-es")
+    ]
+    assert max(middles) <= 1.02 * min(middles), least
 
 
 @pytest.mark.slow
