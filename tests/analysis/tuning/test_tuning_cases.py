@@ -130,7 +130,7 @@ def test_a_saturated_lqr_on_a_sliding_strip_moves_alike_by_each_method():
             np.testing.assert_allclose(run[name], runs[0][name], atol=2e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(3000)
 def test_no_search_of_five_seeds_stays_2_percent_behind():
     """No search stays 2 % behind what most reach, and no algorithm behind the others. J has several
