@@ -28,7 +28,7 @@ from ..comparison.replay.lead_screw import backlash_output
 from ..comparison.replay.smoothing import recorded_samples, resolution
 from ..recordings.unit_conversion import velocity
 from ..rig.axes import MotorAxis
-from ..rig.plant.motor import JointLine, back_driven_efficiency, motor_data
+from ..rig.plant.motor import JointLine
 from .estimate import Estimate, Parameter, estimate
 
 # slower is no sliding [m/s, rad/s]; what must have been travelled after a reversal [m, rad]
@@ -89,7 +89,7 @@ def fit(
         mass, given = line.moved(_carried(robot, axis)), np.zeros(len(t))
     else:
         mass = line.inertia
-        given = _given(axis, np.interp(t, experiment.t, torque_N_m), measured)
+        given = _given(line, np.interp(t, experiment.t, torque_N_m), measured)
     size = max(2, round(WINDOW_S / float(np.median(np.diff(t)))))
     first = np.flatnonzero(_whole(slides, np.sign(measured), size))
     last = first + size
@@ -123,7 +123,7 @@ def fit(
         Parameter("voltage_delay_s", 1e-3, 2e-4, (-5e-3, 0.02), factor=False),
     )
     found = estimate(model, parameters, round(CORRELATION_S / float(np.median(np.diff(t)))))
-    for what in ({"volts": 1 + VOLTAGE_UNCERTAINTY}, {"own": own_deviation / _efficiency(axis)}):
+    for what in ({"volts": 1 + VOLTAGE_UNCERTAINTY}, {"own": own_deviation / line.efficiency}):
         found = found.with_model_uncertainty(model(found.values | what) - found.residuals)
     return found
 
@@ -144,16 +144,10 @@ def _over(total: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
     return total[last] - total[first]
 
 
-def _efficiency(axis: MotorAxis) -> float:
-    return motor_data(axis).gear_efficiency * axis.efficiency
-
-
-def _given(axis: MotorAxis, torque_N_m: np.ndarray, speed: np.ndarray) -> np.ndarray:
+def _given(line: JointLine, torque_N_m: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """What the motor gives to its gear (T,) [N m] for the torque that the joint takes from it."""
-    forward = _efficiency(axis)
-    back = back_driven_efficiency(motor_data(axis).gear_efficiency)
-    back *= back_driven_efficiency(axis.efficiency)
-    return np.where(torque_N_m * speed > 0, torque_N_m / forward, torque_N_m * back)
+    driven = torque_N_m / line.efficiency
+    return np.where(torque_N_m * speed > 0, driven, torque_N_m * line.back_driven)
 
 
 def _carried(robot: fx.Robot, axis: MotorAxis) -> float:

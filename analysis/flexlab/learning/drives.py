@@ -18,7 +18,7 @@ from flexura.control import JointLoop, JointSpring
 from ..rig import Check, RigSetup
 from ..rig.axes import MotorAxis, motor_axes
 from ..rig.configuration import calibration
-from ..rig.plant.motor import joint_line, motor_data
+from ..rig.plant.motor import joint_line
 from ..rig.plant.stepper import MagneticSpring
 from .knowledge import Knowledge
 
@@ -184,8 +184,8 @@ def _voltage(
     """The voltage (T,) [V] that moves a motor's joint against a load, with the bridge's dead
     zone."""
     assert callable(course)
-    line, data = joint_line(axis, *knowledge.friction_of(axis)), motor_data(axis)
-    loss = (1 / (data.gear_efficiency * axis.efficiency) - 1) * np.abs(load)
+    line = joint_line(axis, *knowledge.friction_of(axis))
+    loss = (1 / line.efficiency - 1) * np.abs(load)
     loss = np.where(load * side < 0, np.minimum(loss, np.abs(load)), loss)
     force = line.inertia * course(t, 2) + line.viscous * course(t, 1) + load
     volts = (force + (line.coulomb + loss) * side) / line.force_per_V

@@ -19,6 +19,7 @@ LINE = JointLine(
     static=56.0,
     guide=4.0,
     efficiency=0.5,
+    back_driven=0.0,
 )
 
 

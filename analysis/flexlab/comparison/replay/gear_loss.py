@@ -18,15 +18,10 @@ from flexura.signals import Loads, Signal
 from flexura.system import RunStates, System
 
 from ...rig.axes import MotorAxis
-from ...rig.plant.motor import JointLine, back_driven_efficiency, motor_data
+from ...rig.plant.motor import JointLine
 
 SLOW = 1e-2  # rad/s: below, a loss fades to zero, as Coulomb friction does (57)
 ROUNDS, CLOSE = 20, 1e-3  # of the way of a joint: what the last round may change of its motion
-
-
-def lossless(axis: MotorAxis) -> bool:
-    """Whether a drive loses nothing of its load."""
-    return motor_data(axis).gear_efficiency * axis.efficiency >= 1.0
 
 
 def with_losses(
@@ -56,7 +51,7 @@ def with_losses(
         system, t, fx.Drive.force(*acting), q0=q0, rtol=rtol, progress=progress
     )
     run = solve(forces)
-    if run.interrupted or all(lossless(axis) for axis, _ in lines):
+    if run.interrupted or all(line.efficiency >= 1.0 for _, line in lines):
         return run
     run.meta["gear_loss_rounds"] = None
     for rounds in range(1, ROUNDS + 1):
@@ -90,8 +85,6 @@ def losses(
         along = np.tanh(speed / SLOW)
         load = drive[:, i] - line.inertia * qdd[:, rows[i]] - line.viscous * speed
         load = load - line.coulomb * along
-        efficiency = motor_data(axis).gear_efficiency * axis.efficiency
-        back = back_driven_efficiency(motor_data(axis).gear_efficiency)
-        driving, driven = 1 / efficiency - 1, 1 - back * back_driven_efficiency(axis.efficiency)
+        driving, driven = 1 / line.efficiency - 1, 1 - line.back_driven
         out.append(np.where(load * speed > 0, driving, driven) * np.abs(load) * along)
     return out

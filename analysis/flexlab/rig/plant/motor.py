@@ -168,7 +168,7 @@ class JointLine:
     F [N or N m] acts on `inertia` [kg or kg m^2], the rotor's at the joint, and the robot's own.
     Inductance, dead zone and backlash are left out. `static` holds at rest. `guide` is the joint's
     own part of `coulomb` and `static`; it is missing while the motor crosses the backlash.
-    `efficiency` is that of gear and screw.
+    `efficiency` is that of gear and screw, `back_driven` where the load drives them.
     """
 
     force_per_V: float
@@ -178,6 +178,7 @@ class JointLine:
     static: float
     guide: float
     efficiency: float
+    back_driven: float
 
     def moved(self, load: float) -> float:
         """What the motor moves at the joint with a rigid load [kg or kg m^2].
@@ -226,4 +227,5 @@ def joint_line(
         friction * breakaway / r + rail,
         rail,
         efficiency,
+        back_driven_efficiency(data.gear_efficiency) * back_driven_efficiency(axis.efficiency),
     )
