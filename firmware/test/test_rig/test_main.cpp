@@ -29,6 +29,18 @@ static Result arm_as(Mode mode) {
   return ask(Arm::kCode, &arm);
 }
 
+// Eight knots of the same drives, and the start after so many ticks.
+static void start_drives(int16_t voltage, int16_t rate, uint8_t at) {
+  Drives drives = {};
+  drives.count = 8;
+  for (uint8_t k = 0; k < 8; ++k) {
+    drives.voltage[k] = voltage;
+    drives.rate[k] = rate;
+  }
+  const Start start = {at};
+  CHECK(ask(Drives::kCode, &drives) == Result::ok && ask(Start::kCode, &start) == Result::ok);
+}
+
 static bool is_set(const Telemetry &report, Flag flag) {
   return report.flags >> static_cast<uint8_t>(flag) & 1;
 }
@@ -117,11 +129,7 @@ static void a_report_has_the_voltage_that_was_asked_for() {
     config.voltage_slew_V_s() = 1e4f;
     begin_with(config);
     CHECK(reference(0, 0, 0) == Result::ok && arm_as(Mode::open_loop) == Result::ok);
-    Drives drives = {};
-    drives.count = 8;
-    for (uint8_t k = 0; k < 8; ++k) drives.voltage[k] = voltage;
-    const Start start = {5};
-    CHECK(ask(Drives::kCode, &drives) == Result::ok && ask(Start::kCode, &start) == Result::ok);
+    start_drives(voltage, 0, 5);
     tick(16);
     Telemetry report;
     rig.report(report);
@@ -138,11 +146,7 @@ static void joint_2_brakes_after_a_halt_and_stands_after_a_stop() {
   for (uint8_t stops = 0; stops < 2; ++stops) {
     begin_with(config);
     CHECK(reference(0, 0, 0) == Result::ok && arm_as(Mode::open_loop) == Result::ok);
-    Drives drives = {};
-    drives.count = 8;
-    for (uint8_t k = 0; k < 8; ++k) drives.rate[k] = 1000;
-    const Start start = {6};
-    CHECK(ask(Drives::kCode, &drives) == Result::ok && ask(Start::kCode, &start) == Result::ok);
+    start_drives(0, 1000, 6);
     for (uint16_t k = 0; k < 300 || (k < 400 && out.steps.count == 0); ++k) {
       if (k % 50 == 0) rig.host_spoke();
       tick();
@@ -257,11 +261,7 @@ static void what_a_run_left_does_not_reach_the_next() {
   config.stall_voltage_V() = 0;
   begin_with(config);
   CHECK(reference(0, 0, 0) == Result::ok && arm_as(Mode::open_loop) == Result::ok);
-  Drives drives = {};
-  drives.count = 8;
-  for (uint8_t k = 0; k < 8; ++k) drives.voltage[k] = 3000;
-  const Start start = {5};
-  CHECK(ask(Drives::kCode, &drives) == Result::ok && ask(Start::kCode, &start) == Result::ok);
+  start_drives(3000, 0, 5);
   tick(10);
   CHECK(out.duty[0] > 100 && ask(Stop::kCode) == Result::ok);
   tick(2);
@@ -280,6 +280,7 @@ static void what_a_run_left_does_not_reach_the_next() {
     Setpoints points = {};
     points.count = 1;
     points.final = 1;
+    const Start start = {5};
     CHECK(ask(Setpoints::kCode, &points) == Result::ok && ask(Start::kCode, &start) == Result::ok);
     tick(static_cast<uint16_t>(4 + wait));
     still().moved[0] = 100;
