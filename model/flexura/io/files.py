@@ -235,12 +235,22 @@ def replace_results(draft: Path, folder: Path) -> None:
         folder: where they go.
 
     Raises:
-        OSError: the file system refuses something.
+        OSError: the file system refuses something. The old results are there, or the new ones: in
+            their places if the file system refused once, else in FINISHED, and it says so.
     """
     settle(folder)
     with _alone(draft):
-        move(draft, folder / FINISHED)
-        _settle(folder)
+        try:
+            move(draft, folder / FINISHED)
+            _settle(folder)
+        except OSError as error:
+            with suppress(OSError):
+                _settle(folder)
+            if not (folder / FINISHED).exists():
+                raise
+            where = f"the new results are whole in {FINISHED}: the next call with this folder "
+            why = f"{error.strerror}; {where}moves them to their places"
+            raise OSError(error.errno, why) from error
 
 
 def settle(folder: Path) -> None:
