@@ -22,6 +22,7 @@ from flexlab.board.protocol.declaration import ADC_SAMPLES, CONFIG, CONTROL_HZ, 
 from flexura import signals
 from flexura.control import gains
 
+PARTS = {"test_numbers", "test_control", "test_trajectories", "test_states"}
 SUITES = {"test_drives", "test_refusals", "test_faults", "test_rig", "test_session"}
 TICK_S = 1 / CONTROL_HZ
 
@@ -386,8 +387,8 @@ def test_no_damaged_frame_is_obeyed(tmp_path, frames, seed):
 @pytest.mark.parametrize(
     "environment, suites",
     [
-        ("native", {"test_lib", *SUITES}),
-        ("simavr", {"test_lib", "test_interrupts"}),
+        ("native", PARTS | SUITES),
+        ("simavr", PARTS | {"test_interrupts"}),
         pytest.param("simavr", SUITES, marks=pytest.mark.slow),
     ],
 )

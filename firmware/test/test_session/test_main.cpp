@@ -268,6 +268,57 @@ static void only_new_commands_are_a_sign_of_life() {
   CHECK(silent_after(99, false) == 201);
 }
 
+static Ack ack_of(Session &session, uint8_t code, uint16_t sequence, const void *fields,
+                  uint8_t size) {
+  uint8_t frame[kFrameMaxBytes], answer[Session::kAnswerMaxBytes], got = 0;
+  const uint8_t length = encode(code, sequence, fields, size, frame);
+  for (uint8_t k = 0; k < length; ++k) got = session.receive(frame[k], answer);
+  Ack ack = {0, 255, 0};
+  Receiver receiver;
+  for (uint8_t k = 0; k < got; ++k)
+    if (receiver.take(answer[k]) && receiver.code() == Ack::kCode &&
+        receiver.sequence() == sequence)
+      memcpy(&ack, receiver.fields(), sizeof ack);
+  return ack;
+}
+
+static bool is(const Ack &ack, Result result) { return ack.result == static_cast<uint8_t>(result); }
+
+static void commands_are_obeyed_once_and_in_order() {
+  healthy();
+  Session session(rig, kBuild);
+  const Hello wrong = {kDeclaration ^ 1}, hello = {kDeclaration};
+  CHECK(is(ack_of(session, Keepalive::kCode, 5, nullptr, 0), Result::out_of_sequence));
+  CHECK(is(ack_of(session, Hello::kCode, 65535, &wrong, Hello::kSize), Result::wrong_declaration) &&
+        !session.open());
+  CHECK(is(ack_of(session, Hello::kCode, 65535, &hello, Hello::kSize), Result::ok) &&
+        session.open());
+  const Reference here = {100, 0, 0}, there = {200, 0, 0};
+  CHECK(is(ack_of(session, Reference::kCode, 0, &here, Reference::kSize), Result::ok));
+  CHECK(is(ack_of(session, Reference::kCode, 0, &there, Reference::kSize),
+           Result::ok));  // repeated: answered, not done
+  Telemetry report;
+  rig.report(report);
+  CHECK(report.position_1 == 100 && report.flags == 1 << static_cast<uint8_t>(Flag::referenced));
+  CHECK(
+      is(ack_of(session, Reference::kCode, 2, &there, Reference::kSize), Result::out_of_sequence));
+  CHECK(ack_of(session, Reference::kCode, 65535, &there, Reference::kSize).detail == 1);
+  CHECK(
+      is(ack_of(session, Reference::kCode, 1, &there, Reference::kSize - 1), Result::wrong_length));
+  CHECK(is(ack_of(session, 99, 1, nullptr, 0), Result::unknown_command));
+  const Arm arm = {2};
+  CHECK(is(ack_of(session, Arm::kCode, 1, &arm, Arm::kSize), Result::ok));
+  CHECK(is(ack_of(session, Hello::kCode, 9, &hello, Hello::kSize), Result::wrong_state));
+  CHECK(is(ack_of(session, Stop::kCode, 40000, nullptr, 0), Result::ok) &&
+        rig.state() == State::idle);
+  CHECK(is(ack_of(session, Stop::kCode, 2, nullptr, 0), Result::ok));
+  CHECK(is(ack_of(session, ConfigSave::kCode, 3, nullptr, 0), static_cast<Result>(255)) &&
+        session.saving());
+  uint8_t frame[kFrameMaxBytes];
+  CHECK(session.saved(true, frame) && !session.saving());
+  CHECK(is(ack_of(session, ConfigSave::kCode, 3, nullptr, 0), Result::ok) && !session.saving());
+}
+
 static void tests() {
   RUN(frames_are_no_longer_and_no_shorter_than_they_may_be);
   RUN(the_board_says_who_it_is);
@@ -276,5 +327,6 @@ static void tests() {
   RUN(a_stop_is_obeyed_at_once_and_counts_only_in_order);
   RUN(settings_are_stored_only_if_the_memory_says_so);
   RUN(only_new_commands_are_a_sign_of_life);
+  RUN(commands_are_obeyed_once_and_in_order);
 }
 CHECK_MAIN(tests())
