@@ -44,12 +44,15 @@ class ErrorNorm {
 
   // Forgets all sizes: a run begins at (q, v).
   void start(const Real *z) {
-    std::vector<Real> slow(
-        n,
-        Real(0.0));  // every joint moves the tips at START of the robot's length a second
-    for (int i = 0; i < plant.joints; ++i)
-      if (!plant.locked[i])
-        slow[plant.first[i]] = plant.reach * START / plant.lever[plant.first[i]];
+    // Every joint moves the tips at START of the robot's length a second; where it is locked, its
+    // link's bending does.
+    std::vector<Real> slow(n, Real(0.0));
+    for (int i = 0; i < plant.joints; ++i) {
+      const int e = plant.first[i];
+      const bool locked = plant.locked[i];
+      for (int k = e + locked; k < (locked ? plant.first[i + 1] : e + 1); ++k)
+        slow[k] = plant.reach * START / plant.lever[k];
+    }
     for (int k = 0; k < n; ++k) begun[k] = z[k];
     largest = {Real(0.0), Real(0.0), Real(0.0), Real(0.0), plant.energy(z, slow.data())};
     grow(z, Real(1.0));

@@ -108,7 +108,7 @@ def simulate(
         meta=solution.meta | {"start": problem.start},
     )
     run = record(problem.system, solution, problem.loads, within)
-    run.meta["events"] = run.meta["events"] + off_motion(problem) + still(run)
+    run.meta["events"] = run.meta["events"] + off_motion(problem) + still(run, problem.loads)
     if isinstance(problem.drive, Controller):
         return problem.drive.recorded(run, solution.sampler)
     return run

@@ -129,8 +129,10 @@ def off_motion(problem: Problem) -> list[Tables]:
     return out
 
 
-def still(run: Run) -> list[Tables]:
-    """The event of a run in which nothing moves and no drive acts; none of another."""
+def still(run: Run, loads: object) -> list[Tables]:
+    """The event of a whole run in which nothing moves and nothing acts; none of another."""
+    if loads or not run.complete:
+        return []
     drives = [values for name, values in run.channels.items() if name.endswith("/drive")]
     if run.states is None or len(run.t) < 2 or any(values.any() for values in drives):
         return []

@@ -245,3 +245,28 @@ def test_loads_and_payloads_are_in_the_internal_forces():
     run = fx.inverse(arm, [0.0, 0.05, 0.15, 0.2], [0.0], payloads=taken, internal_forces=True)
     assert run["joint/1/reaction_y"] == pytest.approx(9.81 * np.array([0.1, 0.1, 0.3, 0.3]))
     assert run["joint/1/reaction_moment"] == pytest.approx(run["joint/1/drive"])
+
+
+@pytest.mark.parametrize("method", ["auto", "exponential", "implicit"])
+@pytest.mark.parametrize("begins_s", [0.0, 0.3])
+@pytest.mark.parametrize("kind", ["R", "Pa", "Pb"])
+def test_a_load_that_grows_from_nothing_moves_a_locked_robot(kind, begins_s, method):
+    """At rest there is neither energy nor work to weigh errors of work by. A joint that is held by
+    a drive, which is not locked, is the same robot."""
+    link = {
+        "length_m": 1.0,
+        "elements": 4,
+        "mass_per_length_kg_m": 0.3,
+        "damping": {"beta_s": 1e-3},
+    }
+    joint = {"R": {"type": "R"}, "Pa": {"type": "Pa"}, "Pb": {"type": "Pb", "start_m": 0.2}}[kind]
+    tables = {"link": [link | {"bending_stiffness_N_m2": 1.0, "joint": joint}]}
+    force = fx.signals.delayed(fx.signals.cycloid(0.1, 1.0 - begins_s), begins_s)
+    load, t = [fx.Load(link=1, force_N=[0.0, force])], np.linspace(0.0, 1.0, 11)
+    held = fx.Drive.prescribed(joint.get("start_m", 0.0))
+    expected = fx.simulate(fx.Robot.from_dict(tables), t, held, loads=load, rtol=1e-8)
+    joint["locked"] = True
+    locked = fx.simulate(fx.Robot.from_dict(tables), t, loads=load, method=method)
+    assert locked.complete and locked.meta["events"] == []
+    assert np.ptp(expected["tip/y"]) > 1e-4
+    assert locked["tip/y"] == pytest.approx(expected["tip/y"], abs=1e-6 * np.ptp(expected["tip/y"]))
