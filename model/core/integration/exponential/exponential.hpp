@@ -139,6 +139,7 @@ class Exponential : public Method<Real> {
       ticked[k] = false;
       if (++since[k] % 8 == 0 || steps.count[k] < ORDER || weights_changed(k))
         set_lane(weigh, k, 1.0);
+      if (raise_cutoff(k)) steps.forget_tables(k);
       if (!modes.has_moved(k, c.plant, q) || !take_modes(k, q, v, lane(end, k))) continue;
       put_origin(k, q, v);
       transform_history(k), steps.forget_tables(k);
@@ -283,6 +284,16 @@ class Exponential : public Method<Real> {
     keep[3 * n] = accounts.record(steps.extra(row), forces, q, v, ed, slope[2 * n + LOSS], given);
     std::copy(slope + n, slope + 2 * n, keep);
     std::copy(state, state + 2 * n, keep + n);
+  }
+
+  // (97): true if robot k has come to turn so fast that fewer modes may be damped.
+  bool raise_cutoff(int k) {
+    const auto &most = c.weights.sizes();
+    const double least = TURNING * lane((most.speed + most.deflecting) / c.plant.reach, k);
+    if (options.cutoff > 0.0 || !(least > modes.cutoff[k])) return false;
+    modes.cutoff[k] = 1.5 * least;
+    modes.damp(k, options.zeta);
+    return true;
   }
 
   void look_at_start(const Real &t) {

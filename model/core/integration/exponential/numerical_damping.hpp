@@ -8,7 +8,10 @@
 // eta' of a struck one. A force of unknown size, a controller's, is seen beside its own largest
 // deflection; where it follows its joint, the joint's place is an output, too. Modes are damped
 // from the first on after which the sum of shares is below rtol / 4. Harmonic forces must be far
-// below the cutoff: it is at least MARGIN times their frequency.
+// below the cutoff: it is at least MARGIN times their frequency. So must the robot's own rates:
+// where it turns fast, N changes with the modes as much as their stiffness does, and the damping
+// would feed them. The cutoff is at least TURNING times the speed of the tips over the robot's
+// length.
 //
 // Measured on 12 undamped robots at rtol 1e-2 to 1e-4 this left errors below 6 rtol, at a fifth of
 // the passes where torques jump.
@@ -21,7 +24,7 @@
 
 namespace flexura {
 
-constexpr double SHARE_OF_RTOL = 0.25, MARGIN = 5.0;
+constexpr double SHARE_OF_RTOL = 0.25, MARGIN = 5.0, TURNING = 20.0;
 
 // The largest |y| and |y''| on a signal from t on, and its highest frequency. (A last segment
 // without end: its first second.)
