@@ -79,7 +79,7 @@ def simulate(
     is how far the energies are from balancing, relative to the largest; beyond 1e-3 an event says
     so, beyond 0.1 the run is not complete. Each event has a name: "limit", "end_of_link", "sleeve",
     "interrupted", "stuck", "diverged", "exhausted", "wall_time", "balance", "not_finite", "node",
-    "until", "still", "off_motion", "payload".
+    "until", "still", "off_motion", "fast", "payload".
 
     Args:
         robot: a System, a Robot, the path or name of a robot file, or a Batch of robots, which

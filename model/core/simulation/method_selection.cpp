@@ -85,7 +85,7 @@ void MethodSelection::choose() {
   const bool bends = c.n > c.plant.joints;
   sharp = rtol < SHARPEST, begun = loop.snapshot();
   if (const char *name = method_without_trial(c, loop.run_state[0].t, rtol))
-    chosen = std::string(name) == "implicit" ? implicit() : by_explicit();
+    compared = std::string(name) == "implicit", chosen = compared ? implicit() : by_explicit();
   else if (acting.rate_Hz > 0.0)
     chosen = method_under_ticks(acting.rate_Hz, bends);
   else if (acting.function)

@@ -15,7 +15,7 @@ from ..signals import Drive, LoadsLike, Manoeuvre, PayloadsLike, SignalLike, as_
 from ..system import RobotLike, System, assemble, check_continuous
 from . import dense, integrator, nodewise_run, payload_changes
 from .problem import Budget, Problem, Progress, Solution, check_times, initial_value_problem
-from .recorder import off_motion, record, still
+from .recorder import fast, off_motion, record, still
 from .stop_condition import StopCondition
 
 DriveLike = (
@@ -108,7 +108,8 @@ def simulate(
         meta=solution.meta | {"start": problem.start},
     )
     run = record(problem.system, solution, problem.loads, within)
-    run.meta["events"] = run.meta["events"] + off_motion(problem) + still(run, problem.loads)
+    remarks = off_motion(problem) + still(run, problem.loads) + fast(run, problem.system.robot)
+    run.meta["events"] = run.meta["events"] + remarks
     if isinstance(problem.drive, Controller):
         return problem.drive.recorded(run, solution.sampler)
     return run

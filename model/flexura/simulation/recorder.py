@@ -67,6 +67,7 @@ def recorded_channels(robot: Robot) -> list[str]:
 # columns of the accounts, as Account of model/core/control/plant.hpp counts them
 WORK, LOSS, NUMERICAL, STRAIN = range(4)
 LIMITS = ("limit", "end_of_link", "sleeve")  # names of events that stop a joint
+FAST_M_S = 1000.0  # of a tip, by one joint: three times the speed of sound
 STILL = 1e-9  # m or rad: a robot whose unknowns change by less does not move
 
 
@@ -140,6 +141,24 @@ def still(run: Run, loads: object) -> list[Tables]:
         return []
     text = "nothing moves: no drive acts, and the robot starts at rest in equilibrium"
     return [{"t": float(run.t[0]), "level": "INFO", "name": "still", "text": text}]
+
+
+def fast(run: Run, robot: Robot) -> list[Tables]:
+    """The event of a run in which a joint moves a tip faster than any robot: a controller that is
+    unstable, or a unit that is wrong; none of another."""
+    reach = sum(link.length_m for link in robot.links)
+    for i, link in enumerate(robot.links, 1):
+        turns = link.joint.type == "R"
+        rates = np.abs(run[f"joint/{i}/velocity"])
+        beyond = np.flatnonzero(rates * (reach if turns else 1.0) > FAST_M_S)
+        if beyond.size:
+            k = int(beyond[0])
+            text = (
+                f"joint {i} moves at {rates[k]:.3g} {'rad/s' if turns else 'm/s'}, which takes a tip "
+                f"beyond {FAST_M_S:g} m/s: is a controller unstable, or a unit wrong?"
+            )
+            return [{"t": float(run.t[k]), "level": "WARN", "name": "fast", "text": text}]
+    return []
 
 
 def describe(system: System, error: float) -> Tables:

@@ -234,3 +234,16 @@ def test_a_torque_that_bends_a_link_beyond_a_right_angle_is_a_motion_like_others
     )
     exact = fx.simulate(bench_arm(), t, drive, method="explicit", rtol=1e-10)
     assert run["tip/x"] == pytest.approx(exact["tip/x"], abs=1e-5)
+
+
+def test_a_loop_that_runs_away_is_named():
+    """A sampled damping that turns a light link's speed round at each tick, and adds to it."""
+    link = {"length_m": 0.5, "mass_per_length_kg_m": 0.2, "joint": {"type": "R", "start_rad": 0.1}}
+    robot, gain = fx.Robot.from_dict({"link": [link]}), 8.0
+    inertia = 0.2 * 0.5**3 / 3
+    wild = fx.Sampled(lambda t, x, v, w: [-gain * inertia * 100.0 * v[0]], 100.0)
+    run = fx.simulate(robot, np.linspace(0.0, 0.05, 6), wild, qd0=[1.0])
+    [event] = [e for e in run.meta["events"] if e["name"] == "fast"]
+    k = int(np.argmax(np.abs(run["joint/1/velocity"]) * 0.5 > 1000.0))
+    assert run.complete and event["t"] == run.t[k] and "joint 1" in event["text"]
+    assert np.abs(run["joint/1/velocity"][:5]) == pytest.approx((gain - 1.0) ** np.arange(5))
