@@ -91,14 +91,13 @@ void check_masses(const Model<double> &model, const Robot &robot) {
     }
     if (c.joint == HubJoint::none || held[std::size_t(c.link)]) continue;
     const double pivot = 1.0 / work.kept[i].inverse;
-    if (pivot > least(c.first) && std::isfinite(pivot)) continue;
-    if (!M.empty() && M[std::size_t(c.first) * (n + 1)] > 0.0)
+    if (!(pivot > least(c.first)) || !std::isfinite(pivot))
       throw Fault(
           c.link, "joint",
-          "no inertia of its own: what it moves hangs on a link that bends and has no mass; "
-          "expected an inertia or mass of the hub, a link with mass, or locked = true");
-    throw Fault(c.link, "joint",
-                "nothing to accelerate: expected a mass or inertia (link, hub, rotor or payload) "
+          !M.empty() && M[std::size_t(c.first) * (n + 1)] > 0.0
+              ? "no inertia of its own: what it moves hangs on a link that bends and has no mass; "
+                "expected an inertia or mass of the hub, a link with mass, or locked = true"
+              : "nothing to accelerate: expected a mass or inertia (link, hub, rotor or payload) "
                 "that this joint moves");
   }
 }
