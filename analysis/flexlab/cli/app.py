@@ -8,6 +8,7 @@ import errno
 import gc
 import importlib
 import keyword
+import os
 import signal
 import sys
 import threading
@@ -139,6 +140,7 @@ def main() -> None:
     in status 1. typer prints the usage too where an option or a command is wrong."""
     # looking for garbage among a million objects just imported is a tenth of the start
     gc.set_threshold(100_000)
+    _open_closed_streams()
     sys.unraisablehook = _unraisable
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupt)
@@ -161,6 +163,15 @@ def main() -> None:
             _end_interrupted()
         typer.echo(f"flexura: {error}", err=True)
         sys.exit(2 if isinstance(error, InputError) else 1)
+
+
+def _open_closed_streams() -> None:
+    """Streams that a service or `>&-` closed lead nowhere: no file of ours gets their number."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            handle = os.open(os.devnull, os.O_RDWR)
+            os.set_inheritable(handle, handle == number)
+            setattr(sys, name, os.fdopen(handle, "w" if number else "r", encoding="utf-8"))
 
 
 _interrupted = threading.Event()  # compiled libraries turn Ctrl-C into errors of their own

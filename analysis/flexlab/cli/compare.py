@@ -10,6 +10,7 @@ import typer
 
 import flexura as fx
 from flexura.io import write_bytes
+from flexura.io.drawing import attempted
 from flexura.optional import need
 
 from ..comparison import table
@@ -124,7 +125,8 @@ def compare(
         found = compared(first, second, channels)
         written = save(found, draft.folder, simulated=other is None)
         if picture is not None:
-            draw(written[-1], picture)
+            with attempted(str(picture)):
+                draw(written[-1], picture)
         names = [path.relative_to(draft.folder) for path in written]
         folder = draft.keep(interrupted=first.interrupted)
     paths = [folder / name for name in names] + ([] if picture is None else [picture])
@@ -167,12 +169,14 @@ def save(c: Comparison, folder: Path, *, simulated: bool) -> list[Path]:
     """Write comparison.json, report.html, report.pdf, comparison.png, review.rrd, and the
     simulation where it is new."""
     paths = [c.simulation.save(folder / "simulation")] if simulated else []
-    for name, data in (
-        ("comparison.json", json_.dumps(table.numbers(c), indent=1).encode()),
-        ("report.html", html(c).encode()),
-        ("report.pdf", pdf(c)),
-        ("comparison.png", png(c)),
+    for name, make in (
+        ("comparison.json", lambda c: json_.dumps(table.numbers(c), indent=1).encode()),
+        ("report.html", lambda c: html(c).encode()),
+        ("report.pdf", pdf),
+        ("comparison.png", png),
     ):
+        with attempted(name):
+            data = make(c)
         write_bytes(folder / name, data)
         paths.append(folder / name)
     return [*paths, write_review(folder / "review.rrd", [c.simulation, c.experiment])]

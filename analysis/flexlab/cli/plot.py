@@ -9,7 +9,7 @@ import typer
 
 from flexura.errors import InputError
 from flexura.io import FILE, write_bytes
-from flexura.io.drawing import FORMS, figure, heading, saved
+from flexura.io.drawing import FORMS, attempted, figure, heading, saved
 
 from .options import ForceFile, Json
 from .output import message, print_results
@@ -52,8 +52,10 @@ def plot(
     paths = [run, *beside]
     with file_result(target, force=force):
         runs = [one_run(path, robot) for path in paths]
-        drawing = figure(runs, patterns, names=legend_names(paths, runs), title=title)
-        write_bytes(target, saved(drawing, form, Title=title or heading(runs)))
+        with attempted(str(target)):
+            drawing = figure(runs, patterns, names=legend_names(paths, runs), title=title)
+            drawn = saved(drawing, form, Title=title or heading(runs))
+        write_bytes(target, drawn)
     if json:
         print_results(True, lambda: None, lambda: {"file": str(target)})
     message(json, f"stored {target}")

@@ -25,6 +25,7 @@ from flexura.io import (
     settle,
     unwritable,
 )
+from flexura.io.drawing import NoPicture
 
 from ..runs.formatting import file_name
 
@@ -73,7 +74,7 @@ class Draft:
 def results(out: Path | None, *names: str, force: bool = False) -> Iterator[Draft]:
     """A draft of the folder `out`, or by default of logs/NAME-NAME-1, -2, ...
 
-    What has not been kept at the end is removed.
+    What has not been kept at the end is removed. Where a picture alone fails, all else is kept.
 
     Raises:
         InputError: `out` has something in it and `force` is false, or it cannot be written.
@@ -81,7 +82,11 @@ def results(out: Path | None, *names: str, force: bool = False) -> Iterator[Draf
     target = LOGS / "-".join(map(file_name, names)) if out is None else out
     refuse_taken(out, force)
     with _folder(target, out is None) as folder, _named(folder, target):
-        yield Draft(folder, target, out is None)
+        draft = Draft(folder, target, out is None)
+        try:
+            yield draft
+        except NoPicture as error:
+            raise NoPicture(f"{error}; all else is stored in {draft.keep()}") from error
 
 
 def refuse_taken(out: Path | None, force: bool) -> None:
@@ -109,12 +114,18 @@ def replacing(folder: Path) -> Iterator[Path]:
     Raises:
         InputError: the folder cannot be written; the old results are as they were.
     """
+    failed: NoPicture | None = None
     with _folder(folder, False) as draft, _named(draft, folder):
-        yield draft
+        try:
+            yield draft
+        except NoPicture as error:
+            failed = NoPicture(f"{error}; all else is stored in {folder}")
         try:
             replace_results(draft, folder)
         except OSError as error:
             raise unwritable(folder, error, "--out") from None
+    if failed:
+        raise failed
 
 
 def continued(out: Path | None, *names: str, mark: str) -> Path:

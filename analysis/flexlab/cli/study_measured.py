@@ -9,6 +9,7 @@ from typing import Any
 
 import flexura as fx
 from flexura.io import write_bytes, write_text
+from flexura.io.drawing import attempted
 from flexura.optional import need
 
 from ..review import write_review
@@ -56,13 +57,15 @@ def study_measured(
             "closed_loop": None if loop is None else asdict(loop),
         }
         write_text(draft.folder / names[0], json_.dumps(told, indent=1) + "\n")
-        write_bytes(draft.folder / names[1], png(described, found, fit))
         fx.save(fit.found.robot, draft.folder / names[2])
         for m in found:
             m.experiment.save(draft.folder / m.name / "experiment")
             m.simulation.save(draft.folder / m.name / "simulation")
             write_review(draft.folder / m.name / "review.rrd", [m.simulation, m.experiment])
             names.append(f"{m.name}/review.rrd")
+        with attempted(names[1]):
+            drawn = png(described, found, fit)
+        write_bytes(draft.folder / names[1], drawn)
         folder = draft.keep()
     stored = [str(folder / name) for name in names]
     print_results(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from flexura.io import emulated
-from flexura.io.drawing import STYLE
+from flexura.io.drawing import STYLE, plain
 from flexura.optional import load
 
 from ..runs.deviation import deviation
@@ -40,9 +40,11 @@ def draw(c: Comparison, entry: Difference, upper: Any, lower: Any) -> None:
         color=GREEN,
         linewidth=2.6,
         alpha=0.75,
-        label=c.names[1],
+        label=plain(c.names[1]),
     )
-    upper.plot(first.t, scale * first[entry.channel], color=BLUE, linewidth=1.1, label=c.names[0])
+    upper.plot(
+        first.t, scale * first[entry.channel], color=BLUE, linewidth=1.1, label=plain(c.names[0])
+    )
     t, values = deviation(first, second, entry.channel)
     lower.plot(t, scale * values, color=PINK, linewidth=0.9)
     lower.axhline(0.0, color="#9aa0a8", linewidth=0.7)
@@ -52,16 +54,16 @@ def draw(c: Comparison, entry: Difference, upper: Any, lower: Any) -> None:
         text = f"largest {abs(size):.3g} {unit}".removesuffix(" 1") + (
             f" = {100 * entry.max_relative:.3g} % of the peak" if entry.peak else ""
         )
-        lower.set_title(text, fontsize=8, loc="right", pad=2, color=PINK)
+        lower.set_title(plain(text), fontsize=8, loc="right", pad=2, color=PINK)
     upper.yaxis.set_offset_position("right")  # beside the legend
-    upper.set_ylabel(f"{name} [{unit}]")
-    lower.set_ylabel(f"difference\n[{unit}]")
+    upper.set_ylabel(f"{name} [{plain(unit)}]")
+    lower.set_ylabel(plain(f"difference\n[{unit}]"))
     lower.set_xlabel("time [s]")
     ends = min(first.t[0], second.t[0]), max(first.t[-1], second.t[-1])
     for axes in (upper, lower):
         axes.set_xlim(*ends)
     upper.tick_params(labelbottom=False)
-    upper.set_title(heading(c, entry), loc="left", fontsize=9.5, fontweight="bold", pad=17)
+    upper.set_title(plain(heading(c, entry)), loc="left", fontsize=9.5, fontweight="bold", pad=17)
     upper.legend(
         frameon=False,
         loc="lower left",
@@ -83,11 +85,13 @@ def symbol(entry: Difference) -> str:
         name.
     """
     *_, number, name = ("", *entry.channel.split("/"))
+    if not number.isdigit():
+        return plain(name.replace("_", " "))
     if name == "tip_deflection":
         return f"$w_{{{number}}}$"
     if name == "position":
         return f"${'q' if entry.unit == 'rad' else 'd'}_{{{number}}}$"
-    return name.replace("_", " ")
+    return plain(name.replace("_", " "))
 
 
 def heading(c: Comparison, entry: Difference) -> str:

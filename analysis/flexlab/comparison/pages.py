@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 from flexura.io import EMULATED
-from flexura.io.drawing import STYLE
+from flexura.io.drawing import STYLE, plain, told
 from flexura.optional import load
 
 from .figures import draw, is_emulated
@@ -42,7 +42,11 @@ def pdf(c: Comparison) -> bytes:
     subject = EMULATED if is_emulated(c) else c.names[1]
     about_file = {"Title": title(c), "Subject": subject, "CreationDate": None}
     buffer = io.BytesIO()
-    with matplotlib.rc_context(STYLE), pages(buffer, metadata=about_file) as file:
+    with (
+        told(),
+        matplotlib.rc_context(STYLE | {"pdf.fonttype": 42}),
+        pages(buffer, metadata=about_file) as file,
+    ):
         for sheet in drawn(c):
             file.savefig(sheet)
     return buffer.getvalue()
@@ -201,11 +205,6 @@ class Sheets:
     @staticmethod
     def _step(size: float) -> float:
         return LEADING * size / 72 / HEIGHT_IN
-
-
-def plain(text: str) -> str:
-    """A text without mathematics."""
-    return text.replace("$", r"\$")
 
 
 def _front(sheets: Sheets, c: Comparison) -> None:

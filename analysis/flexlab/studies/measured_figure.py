@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
+from typing import Any
 
 import flexura as fx
+from flexura.io.drawing import LETTERS, plain, saved
 from flexura.optional import load
 
 from .measured import GAUGE, Measured
@@ -23,9 +24,14 @@ def png(robot: fx.Robot, found: Sequence[Measured], fit: MeasuredFit | None = No
     Returns:
         A PNG picture.
     """
-    Figure = load("matplotlib.figure").Figure
+    with load("matplotlib").rc_context(LETTERS):
+        return saved(_drawn(robot, found, fit), "png", dpi=150)
 
-    drawing = Figure(figsize=(8, 1.0 + 1.9 * len(found)), layout="constrained")
+
+def _drawn(robot: fx.Robot, found: Sequence[Measured], fit: MeasuredFit | None) -> Any:
+    drawing = load("matplotlib.figure").Figure(
+        figsize=(8, 1.0 + 1.9 * len(found)), layout="constrained"
+    )
     places = drawing.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0]
     fitted = {p.name: p for p in fit.runs} if fit else {}
     for axes, m in zip(places, found, strict=True):
@@ -37,7 +43,7 @@ def png(robot: fx.Robot, found: Sequence[Measured], fit: MeasuredFit | None = No
             gauge = fitted[m.name].gauge
             axes.plot(m.experiment.t, 1e3 * gauge, color="C2", linewidth=1, label="fitted")
         axes.set_title(
-            f"{m.name}: {m.ring_Hz:.3f} Hz measured, {m.simulated_Hz:.3f} Hz simulated",
+            f"{plain(m.name)}: {m.ring_Hz:.3f} Hz measured, {m.simulated_Hz:.3f} Hz simulated",
             fontsize="small",
             loc="left",
         )
@@ -45,7 +51,5 @@ def png(robot: fx.Robot, found: Sequence[Measured], fit: MeasuredFit | None = No
         axes.grid(alpha=0.3)
     places[0].legend(frameon=False, loc="upper right")
     places[-1].set_xlabel("t [s]")
-    drawing.suptitle(f"{robot.name}: hub motion as measured", fontsize="medium")
-    buffer = io.BytesIO()
-    drawing.savefig(buffer, format="png", dpi=150)
-    return buffer.getvalue()
+    drawing.suptitle(f"{plain(robot.name)}: hub motion as measured", fontsize="medium")
+    return drawing

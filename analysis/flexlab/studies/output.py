@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexura.io import room_for_arrow, sealed_parquet, write_bytes
+from flexura.io.drawing import LETTERS, attempted, plain, saved
 from flexura.optional import load
 
 from ..runs.formatting import number
@@ -135,19 +135,21 @@ def save(study: Study, folder: Path) -> list[Path]:
     )
     paths = [folder / f"study.{kind}" for kind in ("parquet", "png", "svg")]
     write_bytes(paths[0], sealed_parquet(sink.getvalue().to_pybytes()))
-    drawing = figure(study)
     for path in paths[1:]:
-        buffer = io.BytesIO()
-        drawing.savefig(buffer, format=path.suffix[1:], dpi=150)
-        write_bytes(path, buffer.getvalue())
+        with attempted(path.name):
+            drawn = saved(figure(study), path.suffix[1:], dpi=150)
+        write_bytes(path, drawn)
     return paths
 
 
 def figure(study: Study) -> Any:
     """The study's figure, a matplotlib Figure: the deflection over what was varied."""
-    Figure = load("matplotlib.figure").Figure
+    with load("matplotlib").rc_context(LETTERS):
+        return _drawn(study)
 
-    drawing = Figure(figsize=(7.5, 5), layout="constrained")
+
+def _drawn(study: Study) -> Any:
+    drawing = load("matplotlib.figure").Figure(figsize=(7.5, 5), layout="constrained")
     axes = drawing.subplots()
     rows = [row for row in study.rows if row["complete"]]
     {"payload": _payload, "length-ratio": _length_ratio, "boundary": _boundary}[study.name](
@@ -158,7 +160,9 @@ def figure(study: Study) -> Any:
     axes.grid(alpha=0.3)
     axes.legend(frameon=False, loc="upper center" if study.name == "length-ratio" else "best")
     axes.set_title(
-        "\n".join([study.robot.name, *study.about.split("; ")]), fontsize="medium", loc="left"
+        plain("\n".join([study.robot.name, *study.about.split("; ")])),
+        fontsize="medium",
+        loc="left",
     )
     return drawing
 

@@ -12,7 +12,7 @@ import numpy as np
 import flexura as fx
 from flexura.control import Designed, Gains, StepResponse, step_response
 from flexura.io import write_bytes
-from flexura.io.drawing import saved
+from flexura.io.drawing import attempted, saved
 
 from ..runs.formatting import number
 from ..runs.table import Table
@@ -131,10 +131,12 @@ def save(found: TuningResult, folder: Path) -> list[Path]:
         for number, k in enumerate(history.pareto_front(), 1):
             task.tuned(values[k]).write(folder / "front" / f"gains-{number:02d}.toml")
         paths.append(folder / "front")
-    drawing = figure(task, history, found.runs[0])
     for kind in ("png", "svg"):
         paths.append(folder / f"tuning.{kind}")
-        write_bytes(paths[-1], saved(drawing, kind, Title=f"tuning: {task.manoeuvre.name}"))
+        with attempted(paths[-1].name):
+            drawing = figure(task, history, found.runs[0])
+            drawn = saved(drawing, kind, Title=f"tuning: {task.manoeuvre.name}")
+        write_bytes(paths[-1], drawn)
     return paths
 
 

@@ -18,7 +18,8 @@ import numpy as np
 from ..errors import InputError
 from . import run_file, summary
 from .drawing.film import animation
-from .drawing.over_time import FORMS, figure, heading, saved
+from .drawing.over_time import figure, heading
+from .drawing.pictures import FORMS, saved
 from .files import path_of, refuse_taken, write_bytes
 from .frames import pandas_frame, xarray_dataset
 from .quantities import converted, fault, from_first, suffix, unit

@@ -42,6 +42,20 @@ def test_further_runs_are_drawn_too(folder, tmp_path):
     assert "tip x, strip, simulation" in text and "tip x, other, simulation" in text
 
 
+@pytest.mark.parametrize("title", ["$5 to $6_a", r"a $\frac$", r"\$ and $", "手 and 足"])
+def test_a_title_is_shown_letter_by_letter(title, folder, tmp_path):
+    named = fx.Run.read(folder)
+    named.meta["robot"]["name"] = title
+    named.save(tmp_path / "named")
+    for source, options in ((folder, ["--title", title]), (tmp_path / "named", [])):
+        call("plot", source, "--out", tmp_path / "a.svg", "--force", *options)
+        assert f">{title}" in (tmp_path / "a.svg").read_text()
+        done = call("plot", source, "--out", tmp_path / "a.png", "--force", *options)
+        assert done.exit_code == 0
+        assert "Warning" not in done.stderr and done.stderr.count("\n") <= 1, done.stderr
+    assert call("animate", tmp_path / "named", "--duration-s", "0.1").exit_code == 0
+
+
 def test_an_animation_is_written_beside_the_run(folder):
     done = call("animate", folder, "--duration-s", "0.2", "--frame-rate", "10")
     assert done.exit_code == 0 and (folder / "run.gif").read_bytes().startswith(b"GIF89a")

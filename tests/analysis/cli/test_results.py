@@ -6,6 +6,7 @@ import os
 import re
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 
@@ -115,6 +116,39 @@ def test_an_interrupted_study_leaves_the_finished_one(place, monkeypatch):
     assert files(place / "out") == finished
     beside = place / "out-interrupted-1"
     assert {p.name for p in beside.iterdir()} == {"study.parquet", "study.png", "study.svg"}
+
+
+TUNE = [
+    "tune",
+    RIG,
+    "rig-step",
+    "--controller",
+    "rig",
+    "--rig",
+    "rig",
+    "--free",
+    "kp_1_V_m=100:9000",
+]
+TUNE += ["--algorithm", "cma-es", "--population", "4", "--generations", "1"]
+
+
+@pytest.mark.parametrize(
+    "command, kept",
+    [
+        ([*STUDY, "--channels"], ["study.parquet", "runs/001/run.parquet"]),
+        (TUNE, ["gains.toml", "best/run.parquet"]),
+        (["compare", "a", "a"], ["comparison.json"]),
+    ],
+    ids=["study", "tune", "compare"],
+)
+def test_a_picture_that_fails_loses_no_results(command, kept, place):
+    """Here it is larger than matplotlib can draw."""
+    if "a" in command:
+        assert run(["simulate", RIG, LAW, "--out", "a"])[0] == 0
+    with matplotlib.rc_context({"savefig.bbox": "tight", "savefig.pad_inches": 1e5}):
+        status, _, err = run([*command, "--out", "out"])
+    assert status == 1 and "cannot be drawn" in err and "stored in out" in err
+    assert all((place / "out" / name).is_file() for name in kept)
 
 
 def test_work_that_is_killed_leaves_the_finished_results(tmp_path):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from flexura.io.drawing import LETTERS, plain
 from flexura.optional import load
 
 from .judgement import PAYLOADS, SETTLED, Judged, from_end
@@ -28,12 +29,9 @@ CURVES = {
     "inversion": ("#009E73", "-"),
     "least time": ("#D55E00", (0, (4, 1, 1, 1))),
 }
-FONT = {
+FONT = LETTERS | {
     "font.size": 6.5,
     "axes.linewidth": 0.5,
-    "svg.hashsalt": "flexura",
-    "pdf.fonttype": 42,
-    "font.family": "DejaVu Sans",
 }
 WIDTH_IN, ROW_IN = 3.5, 0.115  # of a column, of a method in a panel
 LEAST_MM, MOST_MM = 5e-4, 2e2  # what the axes of lengths show
@@ -64,7 +62,7 @@ def figure(study: Mapping[str, tuple[Task, list[Judged]]]) -> Any:
             _lengths(axes[1, k], judged)
             _times(axes[2, k], judged)
             _drives(axes[3, k], task, judged)
-            axes[0, k].set_title(task.robot.name, fontweight="bold", fontsize=7, pad=10)
+            axes[0, k].set_title(plain(task.robot.name), fontweight="bold", fontsize=7, pad=10)
         for k, axis in enumerate(axes.flat):
             axis.annotate(
                 f"({chr(97 + k)})",

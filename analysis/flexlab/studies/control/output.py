@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from flexura.io import sealed_parquet, write_bytes
+from flexura.io.drawing import attempted, saved
 from flexura.optional import load
 
 from ...runs.formatting import finite, number
@@ -131,12 +131,10 @@ def save(study: Study, folder: Path) -> list[Path]:
     )
     paths = [folder / f"study.{kind}" for kind in ("parquet", "png", "svg", "pdf")]
     write_bytes(paths[0], sealed_parquet(sink.getvalue().to_pybytes()))
-    drawing, matplotlib = figure(study), load("matplotlib")
+    with attempted("the study's figure"):
+        drawing = figure(study)
     for path in paths[1:]:
-        buffer = io.BytesIO()
-        kind = path.suffix[1:]
-        clock = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[kind]
-        with matplotlib.rc_context(FONT):
-            drawing.savefig(buffer, format=kind, dpi=300, metadata=clock)
-        write_bytes(path, buffer.getvalue())
+        with attempted(path.name), load("matplotlib").rc_context(FONT):
+            drawn = saved(drawing, path.suffix[1:], dpi=300)
+        write_bytes(path, drawn)
     return paths

@@ -17,6 +17,7 @@ from ...errors import FlexuraError, InputError
 from ...optional import Missing, load
 from ..files import path_of, replaced, write_bytes
 from .over_time import AXES, COLOURS, GRID, INK, STYLE, heading
+from .pictures import plain, told
 from .poses import with_poses
 from .shapes import Curves, curves, extent, has_shapes
 
@@ -116,7 +117,8 @@ def _pictures(
     mark = 0.022 * float((high - low).max())
     every = curves(run, np.arange(len(run)), mark)
     with matplotlib.rc_context(STYLE):
-        scene = Scene(run, every, low, high, film)
+        with told("the film"):
+            scene = Scene(run, every, low, high, film)
         for k, sample in enumerate(index):
             yield scene.drawn(int(sample))
             progress((k + 1) / len(index))
@@ -154,7 +156,7 @@ class Scene:
         axes.grid(color=GRID)
         text, line_y = heading([run]), 1 - top / 2 / tall
         text = text if len(text) <= 60 else f"{text[:57]}..."
-        self.figure.text(0.015, line_y, text, fontsize=9, va="center")
+        self.figure.text(0.015, line_y, plain(text), fontsize=9, va="center")
         self.clock = self.figure.text(
             0.985, line_y, "", fontsize=9, va="center", ha="right", animated=True
         )

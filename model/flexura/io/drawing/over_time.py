@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from re import sub
@@ -14,6 +13,7 @@ from ...errors import InputError
 from ...optional import load
 from ..quantities import channel
 from ..quantities.labels import called
+from .pictures import LETTERS, plain
 from .sampling import thinned
 
 if TYPE_CHECKING:
@@ -24,13 +24,11 @@ if TYPE_CHECKING:
 # Okabe and Ito's colours, told apart by all kinds of colour vision; the light ones last.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#30343b")
 DASHES = ("-", "--", "-.", ":")
-FORMS = ("pdf", "svg", "png")
 SAMPLES = 20_000  # of one curve: more than any paper shows
 WIDTH_IN, PANEL_IN = 7.2, 1.9  # a page's text width; the height of a panel
 LEGEND_LINES = 9  # of one column
 INK, AXES, GRID = "#30343b", "#9aa0a8", "#e3e6ea"
-STYLE: dict[str, Any] = {
-    "font.family": "DejaVu Sans",
+STYLE: dict[str, Any] = LETTERS | {
     "font.size": 9,
     "figure.facecolor": "white",
     "axes.facecolor": "white",
@@ -48,9 +46,6 @@ STYLE: dict[str, Any] = {
     "axes.axisbelow": True,
     "axes.formatter.use_mathtext": True,
     "axes.formatter.limits": (-3, 4),
-    "svg.fonttype": "none",
-    "pdf.fonttype": 42,
-    "svg.hashsalt": "flexura",
 }
 # what a figure shows that was asked for nothing in particular: a panel each, of each unit
 USUAL = (
@@ -104,7 +99,7 @@ def figure(
         ends = min(run.t[0] for run in runs), max(run.t[-1] for run in runs)
         if ends[0] < ends[1]:
             every[-1].set_xlim(*ends)
-        drawing.suptitle(title or heading(runs), fontsize=9.5, x=0.01, ha="left")
+        drawing.suptitle(plain(title or heading(runs)), fontsize=9.5, x=0.01, ha="left")
         drawing.align_ylabels()
     return drawing
 
@@ -155,34 +150,7 @@ def heading(runs: Sequence[Run]) -> str:
         str(name) for run in runs if (name := (run.meta.get("robot") or {}).get("name"))
     )
     what = dict.fromkeys(map(called, runs))
-    text = ": ".join(part for part in (", ".join(robots), ", ".join(what)) if part)
-    return text.replace("$", r"\$")  # no mathematics
-
-
-def saved(drawing: Figure, form: str, **metadata: str) -> bytes:
-    """The bytes of a figure, the same for the same runs.
-
-    Args:
-        drawing: the figure.
-        form: "pdf", "svg" or "png".
-        metadata: kept in the file, such as Title.
-
-    Returns:
-        The content of the file.
-
-    Raises:
-        InputError: another form.
-    """
-    matplotlib = load("matplotlib")
-    if form not in FORMS:
-        raise InputError(
-            f"expected a file that ends with .{', .'.join(FORMS)}", key="out", value=form
-        )
-    fixed: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
-    buffer = io.BytesIO()
-    with matplotlib.rc_context(STYLE):
-        drawing.savefig(buffer, format=form, dpi=200, metadata=metadata | fixed)
-    return buffer.getvalue()
+    return ": ".join(part for part in (", ".join(robots), ", ".join(what)) if part)
 
 
 def _moves(runs: Sequence[Run], name: str) -> bool:
@@ -209,10 +177,10 @@ def _panel(axes: Any, runs: Sequence[Run], channels: Sequence[str], names: Seque
                 color=COLOURS[hue % len(COLOURS)],
                 linestyle=DASHES[turn % len(DASHES)],
                 linewidth=max(1.7 - 0.15 * k, 0.9),  # seen where curves lie on each other
-                label=f"{text}, {whose}" if len(runs) > 1 else text,
+                label=plain(f"{text}, {whose}" if len(runs) > 1 else text),
             )
     said = quantities[0] if len(quantities) == 1 else _common(quantities)
-    axes.set_ylabel(f"{said} [{unit}]".strip())
+    axes.set_ylabel(plain(f"{said} [{unit}]".strip()))
     columns = -(-len(axes.lines) // LEGEND_LINES)
     axes.legend(
         frameon=False,
@@ -239,8 +207,8 @@ def label(name: str, alone: bool) -> str:
         more = " ".join(rest[1:]).replace("_", " ")
         return f"{kind} {rest[0]}" if alone and len(rest) == 2 else f"{kind} {rest[0]} {more}"
     if kind == "sensor":
-        return "/".join(rest).replace("$", r"\$")
-    return channel(name).quantity.replace("$", r"\$")
+        return "/".join(rest)
+    return channel(name).quantity
 
 
 def _common(quantities: Sequence[str]) -> str:
