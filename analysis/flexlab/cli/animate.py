@@ -37,9 +37,9 @@ def animate(
     """
     target = out or (run if run.is_dir() else run.parent) / "run.gif"
     shown = one_run(run, robot)
-    with file_result(target, force=force), progress_bars("pictures") as report:
+    with file_result(target, force=force) as draft, progress_bars("pictures") as report:
         shown.animate(
-            target,
+            draft,
             frame_rate=frame_rate,
             duration=duration_s,
             progress=lambda fraction: report("pictures", fraction),

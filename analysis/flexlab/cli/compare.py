@@ -94,7 +94,10 @@ def compare(
     first = fx.Run.read(run)
     home = run if run.is_dir() else run.parent
     target = counted(home / "comparison", folder=True) if out is None else out
-    with results(target, force=force) as draft, file_result(picture, "--picture", force=force):
+    with (
+        results(target, force=force) as draft,
+        file_result(picture, "--picture", force=force) as shot,
+    ):
         if other is not None:
             for key, value in (("by", by), ("robot", robot)):
                 if value is not None:
@@ -126,7 +129,7 @@ def compare(
         written = save(found, draft.folder, simulated=other is None)
         if picture is not None:
             with attempted(str(picture)):
-                draw(written[-1], picture)
+                draw(written[-1], shot)
         names = [path.relative_to(draft.folder) for path in written]
         folder = draft.keep(interrupted=first.interrupted)
     paths = [folder / name for name in names] + ([] if picture is None else [picture])

@@ -75,8 +75,8 @@ def export(
     source = run / FILE if run.is_dir() else run
     if target.exists() and source.exists() and target.samefile(source):
         raise InputError("the run itself: expected another file", key="--out", value=str(target))
-    with file_result(target, force=force):
-        write_bytes(target, writers[to](read))
+    with file_result(target, force=force) as draft:
+        write_bytes(draft, writers[to](read))
     about: dict[str, Any] = {"file": str(target)}
     if isinstance(read, Run):
         emulated = bool(read.meta.get("emulated"))

@@ -35,12 +35,12 @@ def export_robot(
         raise InputError(expected, key="--to", value=to)
     robot, target = fx.load(path), out or path.with_suffix(f".{to}")
     about: dict[str, Any] = {"file": str(target)}
-    with file_result(target, force=force):
+    with file_result(target, force=force) as draft:
         try:
             content, line, notes = _content(robot, to, fmi, about)
         except InputError as error:
             raise error if error.file else error.in_file(str(path)) from None
-        write_bytes(target, content)
+        write_bytes(draft, content)
     if json:
         print_results(True, lambda: None, lambda: about | {"left_out": notes})
     message(json, line, *(f"left out: {note}" for note in notes), f"stored {target}")

@@ -141,7 +141,7 @@ def identify(
         except fx.InputError as error:
             raise error if error.file else error.in_file(str(run)) from None
         judged = None if other is None else output.check(found, other, by or "commanded")
-        paths, missing = files.save(found, experiment, path)
+        paths, missing = files.save(found, experiment, path, overwrite=force)
     data: dict[str, Any] = output.numbers(found, experiment) | {
         "stored": [str(path) for path in paths],
         "not_stored": missing,

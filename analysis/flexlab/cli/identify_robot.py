@@ -106,7 +106,10 @@ def identify_asked(
     other = None if check is None else fx.Run.read(check)
     first = asked.runs[0]
     home = first if first.is_dir() else first.parent
-    with file_result(out, force=force):
+    with (
+        file_result(out, force=force),
+        file_result(None if out is None else _beside(out), force=force),
+    ):
         with progress_bars("fit") as told:
             found = identify_robot(
                 robot,
@@ -124,7 +127,7 @@ def identify_asked(
         stored: list[Path] = []
         missing = ""
         if json:  # one document says all of it
-            stored, missing = _written(found, out, home)
+            stored, missing = _written(found, out, home, force)
         data: dict[str, Any] = report.numbers(found) | {"stored": list(map(str, stored))}
         if missing:
             data["not_stored"] = missing
@@ -133,7 +136,7 @@ def identify_asked(
         shown = [] if errors is None else [report.checked(found, errors)]
         print_results(json, lambda: [*report.tables(found), *shown], lambda: data)
         if not json:
-            stored, missing = _written(found, out, home)
+            stored, missing = _written(found, out, home, force)
     if missing:
         warn(missing)
     else:
@@ -160,14 +163,21 @@ def _errors(found: Identification, other: fx.Run) -> dict[str, tuple[float, floa
     return {name: (before[name], after[name]) for name in after}
 
 
-def _written(found: Identification, out: Path | None, home: Path) -> tuple[list[Path], str]:
+def _beside(path: Path) -> Path:
+    return path.with_name(f"{path.stem}-report.json")
+
+
+def _written(
+    found: Identification, out: Path | None, home: Path, force: bool = False
+) -> tuple[list[Path], str]:
     """The robot file and the report beside it; or why they could not be written."""
     path = out or counted(home / "identified", folder=True) / "robot.toml"
-    beside = path.with_name(f"{path.stem}-report.json")
+    beside = _beside(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        fx.save(found.robot, path, overwrite=True)
-        write_text(beside, json_.dumps(report.numbers(found), indent=1) + "\n")
+        fx.save(found.robot, path, overwrite=force)
+        text = json_.dumps(report.numbers(found), indent=1) + "\n"
+        write_text(beside, text, new=not force)
     except (fx.InputError, OSError) as error:
         return [], f"{path} is not written: {error}"
     own = [key for key in found.values if of_channel(key)[0]]

@@ -34,10 +34,10 @@ def import_robot(
         json: print JSON.
     """
     target = out or file.with_suffix(".toml")
-    with file_result(None if look else target, force=force):
+    with file_result(None if look else target, force=force) as draft:
         found = read_urdf(file, sections)
         if not look:
-            fx.save(found.robot, target, overwrite=True)
+            fx.save(found.robot, draft, overwrite=True)
     about = data(found) | ({} if look else {"file": str(target)})
     print_results(json, lambda: table(found, file), lambda: about)
     if not look:

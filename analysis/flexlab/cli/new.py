@@ -33,8 +33,8 @@ def new(
     if file.suffix != ".toml":
         raise fx.InputError("expected a name that ends with .toml", key="FILE", value=str(file))
     named = f"name = {json_.dumps(file.stem[:200], ensure_ascii=False)}"
-    with file_result(file, "FILE", force=force):
-        write_text(file, TEMPLATE.read_text("utf-8").replace('name = "my robot"', named, 1))
+    with file_result(file, "FILE", force=force) as draft:
+        write_text(draft, TEMPLATE.read_text("utf-8").replace('name = "my robot"', named, 1))
     if json:
         print_results(True, lambda: None, lambda: {"robot": str(file)})
     message(

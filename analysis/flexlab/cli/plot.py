@@ -50,12 +50,12 @@ def plot(
         expected = f"expected a file that ends with .{', .'.join(FORMS)}"
         raise InputError(expected, key="--out", value=str(target))
     paths = [run, *beside]
-    with file_result(target, force=force):
+    with file_result(target, force=force) as draft:
         runs = [one_run(path, robot) for path in paths]
         with attempted(str(target)):
             drawing = figure(runs, patterns, names=legend_names(paths, runs), title=title)
             drawn = saved(drawing, form, Title=title or heading(runs))
-        write_bytes(target, drawn)
+        write_bytes(draft, drawn)
     if json:
         print_results(True, lambda: None, lambda: {"file": str(target)})
     message(json, f"stored {target}")

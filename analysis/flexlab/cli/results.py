@@ -18,13 +18,15 @@ from pathlib import Path
 from flexura.errors import InputError
 from flexura.io import (
     DRAFT,
-    FINISHED,
+    draft_of,
+    linked,
     make_folder,
-    move,
+    put,
     replace_results,
     settle,
     unwritable,
 )
+from flexura.io import taken as in_use
 from flexura.io.drawing import NoPicture
 
 from ..runs.formatting import file_name
@@ -40,34 +42,56 @@ class Draft:
     folder: Path
     target: Path
     counts: bool  # the place is a default, which counts up
+    force: bool = False
 
     def keep(self, *, interrupted: bool = False) -> Path:
         """Move the results to their place, and return it.
 
         Interrupted work replaces no finished results: it stands in a folder beside.
+
+        Raises:
+            InputError: other results came there meanwhile, and these stand beside; or the file
+                system refuses something.
         """
         try:
-            return self._kept(interrupted)
+            if self.counts:
+                return _counted(self.folder, self.target)
+            if interrupted and taken(self.target):
+                return _counted(self.folder, _named_beside(self.target, "-interrupted"))
+            try:
+                if self.target.is_dir():
+                    replace_results(self.folder, self.target, new=not self.force)
+                else:
+                    put(self.folder, self.target, new=True)
+            except FileExistsError:
+                beside = _counted(self.folder, _named_beside(self.target))
+                raise _late(self.target, beside, "results", "--out") from None
         except OSError as error:
             raise unwritable(self.target, error, "--out") from None
+        return self.target
 
-    def _kept(self, interrupted: bool) -> Path:
-        target = self.target
-        if self.counts or (interrupted and taken(target)):
-            stem = target if self.counts else target.with_name(f"{target.name}-interrupted")
-            while True:
-                target = counted(stem, folder=True)
-                try:
-                    move(self.folder, target)
-                    return target
-                except OSError:
-                    if not os.path.lexists(target):  # else another process took this number
-                        raise
-        if not target.exists():
-            move(self.folder, target)
+
+def _named_beside(target: Path, end: str = "") -> Path:
+    """A name beside a place; that of the working folder is its full one."""
+    target = target if target.name else Path(os.path.abspath(target))
+    return target.with_name(f"{target.name}{end}")
+
+
+def _counted(draft: Path, path: Path, *, folder: bool = True) -> Path:
+    """Give a draft the first free name of NAME-1.EXT, NAME-2.EXT, ..., and return it."""
+    while True:
+        target = counted(path, folder=folder)
+        try:
+            put(draft, target, new=True)
             return target
-        replace_results(self.folder, target)
-        return target
+        except FileExistsError:  # another process took this number
+            continue
+
+
+def _late(path: Path, beside: Path, what: str, key: str) -> InputError:
+    """The error of a command that another one was faster than."""
+    text = f"another command left {what} there meanwhile: what this one made is in {beside}"
+    return InputError(text, key=key, value=str(path))
 
 
 @contextmanager
@@ -82,7 +106,7 @@ def results(out: Path | None, *names: str, force: bool = False) -> Iterator[Draf
     target = LOGS / "-".join(map(file_name, names)) if out is None else out
     refuse_taken(out, force)
     with _folder(target, out is None) as folder, _named(folder, target):
-        draft = Draft(folder, target, out is None)
+        draft = Draft(folder, target, out is None, force)
         try:
             yield draft
         except NoPicture as error:
@@ -100,8 +124,11 @@ def refuse_taken(out: Path | None, force: bool) -> None:
         InputError: `out` has something in it and `force` is false.
     """
     if out is not None and not force and taken(out):
+        wanted = "expected a new or empty folder"
         raise InputError(
-            f"results are there: expected a new or empty folder, {REPLACE}",
+            f"results are there: {wanted}, {REPLACE}"
+            if out.exists()
+            else f"a link to nothing: {wanted}",
             key="--out",
             value=str(out),
         )
@@ -146,36 +173,53 @@ def continued(out: Path | None, *names: str, mark: str) -> Path:
 
 
 @contextmanager
-def file_result(path: Path | None, key: str = "--out", *, force: bool = False) -> Iterator[None]:
+def file_result(path: Path | None, key: str = "--out", *, force: bool = False) -> Iterator[Path]:
     """Try a file before the work: it is not there, and can be written.
 
     Folders that were made for it are removed if it is not there at the end.
 
+    Yields:
+        A draft: what is written there gets the file's name in the end. Without a path, none.
+
     Raises:
-        InputError: the file is there and `force` is false, or it cannot be written.
+        InputError: the file is there and `force` is false, or it cannot be written. If another
+            command wrote it meanwhile, the new one stands beside.
     """
     if path is None:
-        yield
+        yield Path()
         return
     if os.path.isdir(path):
         raise InputError("a folder: expected the name of a file", key=key, value=str(path))
     if os.path.lexists(path) and not force:
+        what = "a file is there" if path.exists() else "a link to nothing"
         raise InputError(
-            "a file is there: expected another name, or --force to replace it",
+            f"{what}: expected another name, or --force to replace it",
             key=key,
             value=str(path),
         )
     made: list[Path] = []
+    target = linked(path)
+    draft = draft_of(target)
     try:
         try:
-            made = make_folder(path.parent)
-            trial = path.parent / f"{DRAFT}{secrets.token_hex(4)}"
-            trial.touch(exist_ok=False)
-            trial.unlink()
+            made = make_folder(target.parent)
+            draft.touch(exist_ok=False)
+            draft.unlink()
         except (OSError, ValueError) as error:
             raise unwritable(path, error, key) from None
-        yield
+        with _named(draft, path):
+            yield draft
+        try:
+            if draft.exists():
+                put(draft, target, new=not force)
+        except FileExistsError:
+            beside = _counted(draft, target, folder=False)
+            raise _late(path, beside, "a file", key) from None
+        except OSError as error:
+            raise unwritable(path, error, key) from None
     finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
         _remove_empty(made)
 
 
@@ -187,14 +231,11 @@ def counted(path: Path, *, folder: bool = False) -> Path:
 
 
 def taken(path: Path) -> bool:
-    """Whether something is there that results would stand on: a file, or a folder with entries."""
+    """Whether something is there that results would stand on; what cannot be read is refused where
+    it is tried."""
     try:
-        if not path.is_dir():
-            return os.path.lexists(path)
-        # what a killed process had in work is no result; a replacement that was decided is one
-        names = (entry.name for entry in path.iterdir())
-        return any(not name.startswith(DRAFT) or name == FINISHED for name in names)
-    except (OSError, ValueError):  # what cannot be read is refused where it is tried
+        return in_use(path)
+    except (OSError, ValueError):
         return False
 
 
@@ -222,7 +263,8 @@ def _folder(target: Path, counts: bool) -> Iterator[Path]:
             made = make_folder(parent)
             settle(parent)
             if not inside and not counts and os.path.lexists(target):
-                raise NotADirectoryError(0, "a file, not a folder")
+                what = "a file" if target.exists() else "a link to nothing"
+                raise NotADirectoryError(0, f"{what}, not a folder")
             folder.mkdir()
             if not inside:
                 (folder / target.name).mkdir()  # a name that the file system refuses

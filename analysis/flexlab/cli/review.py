@@ -57,9 +57,9 @@ def review(
     drawn = None if picture is None else str(picture)
     if runs[0].suffix == ".rrd" and len(runs) == 1 and save is None:
         target = runs[0]
-        with file_result(picture, "--picture", force=force):
+        with file_result(picture, "--picture", force=force) as draft:
             if picture is not None:
-                rerun.picture(target, picture, time_s=time_s)
+                rerun.picture(target, draft, time_s=time_s)
     else:
         read = [one_run(folder, robot if is_population(folder) else None) for folder in runs]
         for path, other in zip(runs[1:], read[1:], strict=True):
@@ -70,12 +70,12 @@ def review(
         if target == beside and target.exists() and not force:
             target = counted(target)
         with (
-            file_result(target, "--save" if save else "--picture", force=force),
-            file_result(picture, "--picture", force=force),
+            file_result(target, "--save" if save else "--picture", force=force) as draft,
+            file_result(picture, "--picture", force=force) as drawing,
         ):
-            rerun.write_review(target, read)
+            rerun.write_review(draft, read)
             if picture is not None:
-                rerun.picture(target, picture, time_s=time_s)
+                rerun.picture(draft, drawing, time_s=time_s)
         message(json, f"stored {target}")
     if picture is not None:
         message(json, f"stored {picture}")

@@ -137,19 +137,22 @@ def with_identified_files(experiment: fx.Run, found: Identified) -> fx.Run:
     return dataclasses.replace(experiment, channels=channels, units=units, meta=meta)
 
 
-def save(found: Identified, experiment: fx.Run, path: Path) -> tuple[list[Path], list[str]]:
+def save(
+    found: Identified, experiment: fx.Run, path: Path, *, overwrite: bool = False
+) -> tuple[list[Path], list[str]]:
     """Write the robot file, and the rig file beside it (NAME-rig.toml).
 
     Args:
         found: the identification.
         experiment: the run; its metadata name the rig's manoeuvre.
         path: the robot file.
+        overwrite: whether files that are there may be replaced.
 
     Returns:
         The files, and a sentence for what could not be written. The rig file names a manoeuvre
         file. An experiment from another computer may have its manoeuvre there.
     """
-    write_toml(path, robot(found).to_dict())
+    write_toml(path, robot(found).to_dict(), new=not overwrite)
     place = beside(path)
     rig_file = Path(str(experiment.meta.get("rig_file", "")))
     manoeuvre = named_file(rig_file, found.nominal.rig.manoeuvre)
@@ -165,7 +168,7 @@ def save(found: Identified, experiment: fx.Run, path: Path) -> tuple[list[Path],
         manoeuvre = os.path.relpath(manoeuvre, path.parent)
     tables = rig(found).model_dump(mode="json", exclude_none=True)
     tables["robot"], tables["manoeuvre"] = path.name, manoeuvre
-    write_toml(place, tables)
+    write_toml(place, tables, new=not overwrite)
     return [path, place], []
 
 

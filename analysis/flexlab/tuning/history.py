@@ -119,7 +119,7 @@ class History:
             sink = io.BytesIO()
             arrays: dict[str, Any] = {name: self.all(name) for name in _ARRAYS}
             np.savez(sink, digest=self.digest, ends=self.ends, wall_s=self.wall_s, **arrays)
-            write_bytes(self.path, sealed(sink.getvalue()))
+            write_bytes(self.path, sealed(sink.getvalue()), new=len(self.ends) == 1)
 
     def objectives_for_algorithm(self, generation: int, points: np.ndarray) -> np.ndarray:
         """The goals of a stored generation.

@@ -10,6 +10,7 @@ import errno
 import os
 import secrets
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -26,27 +27,29 @@ DRAFT = ".flexura-"  # how names begin that no result has
 FINISHED, REPLACED = ".flexura-finished", ".flexura-replaced"
 
 
-def write_text(path: str | os.PathLike[str], text: str) -> None:
+def write_text(path: str | os.PathLike[str], text: str, *, new: bool = False) -> None:
     """Write a file as a whole; see `write_bytes`.
 
     Args:
         path: of the file.
         text: its content.
+        new: no file may be there.
     """
-    write_bytes(path, text.encode())
+    write_bytes(path, text.encode(), new=new)
 
 
-def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+def write_bytes(path: str | os.PathLike[str], data: bytes, *, new: bool = False) -> None:
     """Write a file as a whole: a reader sees the old one or the new one.
 
     Args:
         path: of the file.
         data: its content.
+        new: no file may be there, not even one that another process wrote meanwhile.
 
     Raises:
         InputError: it cannot be written; the old one is still there.
     """
-    with replaced(path) as draft, open(draft, "wb", buffering=0) as stream:
+    with replaced(path, new=new) as draft, open(draft, "wb", buffering=0) as stream:
         rest = memoryview(data)
         while rest:
             rest = rest[stream.write(rest) :]
@@ -80,20 +83,23 @@ def refuse_taken(path: Path) -> None:
         InputError: it is there.
     """
     if os.path.lexists(path):
+        what = "a file is" if path.exists() else "a link to nothing is"
         raise InputError(
-            "a file is there: expected another place, or overwrite=True to replace it",
+            f"{what} there: expected another place, or overwrite=True to replace it",
             file=os.fspath(path),
         )
 
 
 @contextmanager
-def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
+def replaced(path: str | os.PathLike[str], *, new: bool = False) -> Iterator[Path]:
     """A new, empty file beside `path` with its extension, which takes its place in the end.
 
-    Folders are made if need be. If the body fails, the draft is removed and `path` is as it was.
+    Folders are made if need be. If the body fails, the draft is removed and `path` is as it was. A
+    link stays, and the file that it leads to is replaced; its permissions stay.
 
     Args:
         path: of the file to replace.
+        new: no file may be there, not even one that another process wrote meanwhile.
 
     Yields:
         The path of the draft.
@@ -101,10 +107,8 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises:
         InputError: the file system refuses something.
     """
-    target = Path(path)
-    draft = target.with_name(
-        f"{DRAFT}{target.stem[:40]}-{secrets.token_hex(4)}{target.suffix[:20]}"
-    )
+    target = linked(path)
+    draft = draft_of(target)
     try:
         if target.exists() and not target.is_file():
             raise OSError(0, "not a file")  # a device or a folder
@@ -112,15 +116,50 @@ def replaced(path: str | os.PathLike[str]) -> Iterator[Path]:
         os.close(os.open(draft, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o644))
         try:
             yield draft
-            sync(draft)
-            os.replace(draft, target)
+            put(draft, target, new=new)
         except BaseException:
             with suppress(OSError):
                 draft.unlink(missing_ok=True)
             raise
-        sync(target.parent)
+    except FileExistsError:
+        refuse_taken(Path(path))
+        raise
     except OSError as error:
-        raise unwritable(target, error) from None
+        raise unwritable(path, error) from None
+
+
+def linked(path: str | os.PathLike[str]) -> Path:
+    """The file that a link leads to, there or not; any other path as it is."""
+    return Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
+
+
+def draft_of(path: Path) -> Path:
+    """A new name beside a file, with its extension."""
+    return path.with_name(f"{DRAFT}{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix[:20]}")
+
+
+def put(draft: Path, target: Path, *, new: bool) -> None:
+    """Give a file or folder its name, on the disk itself; a file gets the permissions of the one
+    it replaces.
+
+    Args:
+        draft: in the same folder.
+        target: its name.
+        new: nothing may have this name.
+
+    Raises:
+        FileExistsError: it is `new`, and something has this name.
+        OSError: the file system refuses something.
+    """
+    if not new:
+        with suppress(OSError):
+            draft.chmod(stat.S_IMODE(target.stat().st_mode))
+    sync(draft)
+    with _alone(target.parent):
+        if new and taken(target):
+            raise FileExistsError(errno.EEXIST, "a file is there", os.fspath(target))
+        os.replace(draft, target)
+    sync(target.parent)
 
 
 def leftovers(path: Path) -> Iterator[Path]:
@@ -133,22 +172,6 @@ def leftovers(path: Path) -> Iterator[Path]:
         The drafts.
     """
     yield from path.parent.glob(f"{DRAFT}{path.stem[:40]}-*{path.suffix[:20]}")
-
-
-def move(source: Path, target: Path) -> None:
-    """Rename a file or folder on one file system, and synchronise both parents.
-
-    Args:
-        source: its present path.
-        target: its new path.
-
-    Raises:
-        OSError: the file system refuses it.
-    """
-    os.rename(source, target)
-    sync(target.parent)
-    if source.parent != target.parent:
-        sync(source.parent)
 
 
 def make_folder(folder: Path) -> list[Path]:
@@ -224,7 +247,7 @@ def unwritable(path: str | os.PathLike[str], error: Exception, key: str = "") ->
     return InputError(text, file=os.fspath(path))
 
 
-def replace_results(draft: Path, folder: Path) -> None:
+def replace_results(draft: Path, folder: Path, *, new: bool = False) -> None:
     """Move finished results into a folder that is there, over those of the same names.
 
     One rename decides: before it the old results hold, after it the new ones. If the process ends
@@ -233,15 +256,20 @@ def replace_results(draft: Path, folder: Path) -> None:
     Args:
         draft: a folder in `folder`, with the results; it is gone afterwards.
         folder: where they go.
+        new: there may be nothing else in the folder.
 
     Raises:
+        FileExistsError: they are `new`, and other results are there.
         OSError: the file system refuses something. The old results are there, or the new ones: in
             their places if the file system refused once, else in FINISHED, and it says so.
     """
     settle(folder)
-    with _alone(draft):
+    with _alone(folder), _alone(draft):
+        if new and taken(folder):
+            raise FileExistsError(errno.EEXIST, "results are there", os.fspath(folder))
         try:
-            move(draft, folder / FINISHED)
+            os.rename(draft, folder / FINISHED)
+            sync(folder)
             _settle(folder)
         except OSError as error:
             with suppress(OSError):
@@ -251,6 +279,25 @@ def replace_results(draft: Path, folder: Path) -> None:
             where = f"the new results are whole in {FINISHED}: the next call with this folder "
             why = f"{error.strerror}; {where}moves them to their places"
             raise OSError(error.errno, why) from error
+
+
+def taken(path: Path) -> bool:
+    """Whether something is there that results would stand on.
+
+    Args:
+        path: of the results.
+
+    Returns:
+        True for a file, or a folder with entries other than drafts of killed processes.
+
+    Raises:
+        OSError: it cannot be looked into.
+    """
+    if not path.is_dir():
+        return os.path.lexists(path)
+    # what a killed process had in work is no result; a replacement that was decided is one
+    names = (entry.name for entry in path.iterdir())
+    return any(not name.startswith(DRAFT) or name == FINISHED for name in names)
 
 
 def settle(folder: Path) -> None:
@@ -275,7 +322,8 @@ def _alone(folder: Path) -> Iterator[None]:
         handle = -1 if fcntl is None else os.open(folder, os.O_RDONLY)
     try:
         if handle >= 0:
-            fcntl.flock(handle, fcntl.LOCK_EX)
+            with suppress(OSError):  # file systems that cannot lock
+                fcntl.flock(handle, fcntl.LOCK_EX)
         yield
     finally:
         if handle >= 0:

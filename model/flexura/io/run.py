@@ -286,7 +286,7 @@ class Run:
         path = path_of(folder, "folder") / FILE
         if not overwrite:
             refuse_taken(path)
-        write_bytes(path, self.parquet())
+        write_bytes(path, self.parquet(), new=not overwrite)
         return path
 
     def parquet(self) -> bytes:

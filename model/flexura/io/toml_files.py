@@ -66,16 +66,17 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise InputError(f"not valid TOML ({error})", file=name) from None
 
 
-def write_toml(path: str | os.PathLike[str], data: dict[str, Any]) -> None:
+def write_toml(path: str | os.PathLike[str], data: dict[str, Any], *, new: bool = False) -> None:
     """Write tables as a TOML file, as a whole.
 
     Args:
         path: of the file.
         data: the tables.
+        new: no file may be there.
     """
     import tomli_w
 
-    write_text(path, tomli_w.dumps(data))
+    write_text(path, tomli_w.dumps(data), new=new)
 
 
 def changed(tables: Any, changes: Tables, where: str = "a robot file") -> dict[str, Any]:

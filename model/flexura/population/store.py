@@ -152,7 +152,7 @@ class Store:
                     f"chunks without their {MANIFEST}: expected an empty folder, or all of one",
                     file=str(folder),
                 )
-            write_bytes(path, sealed_json(asked))
+            write_bytes(path, sealed_json(asked), new=True)
             return Store(Path(folder))
         begun = manifest(folder)
         differing = [

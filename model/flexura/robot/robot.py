@@ -388,4 +388,4 @@ def save(robot: Robot, path: str | os.PathLike[str], *, overwrite: bool = False)
     described, target = robot_of(robot), path_of(path, "path")
     if not overwrite:
         refuse_taken(target)
-    write_toml(target, {"format": FORMAT} | described.to_dict())
+    write_toml(target, {"format": FORMAT} | described.to_dict(), new=not overwrite)

@@ -90,6 +90,16 @@ def test_migrate_keeps_line_ends_and_a_mark_at_the_beginning(tmp_path):
     assert path.read_bytes() == b"\xef\xbb\xbf" + NEW.replace("\n", "\r\n").encode()
 
 
+def test_migrate_keeps_links_and_permissions(tmp_path):
+    path, link = tmp_path / "arm.toml", tmp_path / "link.toml"
+    path.write_text(OLD)
+    path.chmod(0o600)
+    link.symlink_to(path)
+    assert flexura("migrate", link, cwd=tmp_path).returncode == 0
+    assert link.is_symlink() and path.read_text() == NEW
+    assert path.stat().st_mode & 0o777 == 0o600
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

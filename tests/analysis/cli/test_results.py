@@ -132,6 +132,68 @@ TUNE = [
 TUNE += ["--algorithm", "cma-es", "--population", "4", "--generations", "1"]
 
 
+@pytest.mark.parametrize("empty", [False, True], ids=["new", "empty"])
+@pytest.mark.parametrize(
+    "command, out, late",
+    [
+        (["simulate", RIG, LAW], "out", "out-1"),
+        (["export", "a", "--to", "csv"], "out.csv", "out-1.csv"),
+        (["plot", "a"], "out.png", "out-1.png"),
+        (["new"], "out.toml", "out-1.toml"),
+    ],
+    ids=["simulate", "export", "plot", "new"],
+)
+def test_of_two_commands_at_once_one_stands_beside(command, out, late, empty, place, monkeypatch):
+    """The second begins while the first one publishes: its own check came before."""
+    assert run(["simulate", RIG, LAW, "--out", "a"])[0] == 0
+    if empty:
+        (place / "out").mkdir()
+    arguments = [*command, out] if command == ["new"] else [*command, "--out", out]
+    put, replace_results, others = results.put, results.replace_results, []
+
+    def first(publish):
+        def call(*given, **options):
+            if not others:
+                others.append(None)
+                others[0] = run(arguments)
+                others.append(files(place))
+            publish(*given, **options)
+
+        return call
+
+    monkeypatch.setattr(results, "put", first(put))
+    monkeypatch.setattr(results, "replace_results", first(replace_results))
+    status, _, err = run(arguments)
+    (other, said, _), before = others
+    assert other == 0, said
+    assert status == 2 and err.strip().endswith(f"what this one made is in {late}"), err
+    after = files(place)
+    assert {path: after[path] for path in before if "/.flexura-" not in f"/{path}"}.items() <= (
+        before.items()
+    )
+    assert os.path.lexists(late) and not list(place.rglob(".flexura-*"))
+
+
+@pytest.mark.parametrize("command", ["export a --to csv", "simulate rig"])
+def test_a_link_to_nothing_is_called_so(command, place):
+    assert run(["simulate", RIG, LAW, "--out", "a"])[0] == 0
+    (place / "link").symlink_to("nowhere")
+    status, _, err = run([*command.split(), "--out", "link"])
+    assert status == 2 and "link': a link to nothing: expected" in err
+
+
+def test_a_file_behind_a_link_is_replaced_and_keeps_its_permissions(place):
+    assert run(["simulate", RIG, LAW, "--out", "a"])[0] == 0
+    file, link = place / "real" / "old.csv", place / "link.csv"
+    file.parent.mkdir()
+    file.write_text("old")
+    file.chmod(0o600)
+    link.symlink_to(file)
+    assert run(["export", "a", "--to", "csv", "--out", "link.csv", "--force"])[0] == 0
+    assert link.is_symlink() and file.read_text().startswith("# simulation")
+    assert file.stat().st_mode & 0o777 == 0o600
+
+
 @pytest.mark.parametrize(
     "command, kept",
     [
