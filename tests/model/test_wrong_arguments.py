@@ -192,6 +192,22 @@ def test_the_good_arguments_are_good():
         function(**good)
 
 
+def test_a_batch_of_no_robots_is_refused():
+    with pytest.raises(fx.InputError, match="changes = .*at least one"):
+        fx.Batch.vary(RIG, {"payload.mass_kg": []})
+
+
+@pytest.mark.parametrize(
+    "function",
+    [lambda *a: [0.1, 0.0], lambda t, *a: [0.1, 0.0], lambda t, p, v, w=0.0: [0.1, 0.0]],
+)
+def test_a_function_that_gathers_its_arguments_is_a_drive(function):
+    t = [0.0, 0.1]
+    asked = fx.simulate(RIG, t, lambda t, p, v, w: [0.1, 0.0])
+    np.testing.assert_array_equal(fx.simulate(RIG, t, function)["tip/x"], asked["tip/x"])
+    assert fx.simulate(RIG, t, fx.Sampled(function, 100.0)).complete
+
+
 @pytest.mark.parametrize("place", [None, 3, ["a"]])
 def test_a_place_that_is_no_path_is_named(place):
     run = fx.Run(np.zeros(2) + [0, 1], {"a": np.zeros(2)}, {"a": "m"})

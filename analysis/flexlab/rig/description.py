@@ -10,7 +10,6 @@ sensor or none: [flex], [strain_gauge] or [accelerometer].
 
 from __future__ import annotations
 
-import difflib
 import logging
 import os
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ from pydantic import Field, ValidationError, model_validator
 
 import flexura as fx
 from flexura.errors import InputError, WrongValue
-from flexura.io import FORMAT, check_format, explain, find, is_name, read_toml
+from flexura.io import FORMAT, check_format, explain, find, is_name, meant, read_toml
 
 from ..board.protocol.declaration import CONFIG
 from .emulation import Emulated
@@ -116,8 +115,8 @@ class Rig(Table):
             if name in DERIVED_SETTINGS:
                 raise WrongValue(f"board.{name}", value, "absent: it follows from the other tables")
             if name not in CONFIG:
-                near = difflib.get_close_matches(name, CONFIG, 1, 0.6)
-                hint = f"did you mean {near[0]}?" if near else "see firmware/protocol.toml"
+                near = meant(name, [key for key in CONFIG if key not in DERIVED_SETTINGS])
+                hint = f"did you mean {near}?" if near else "see firmware/protocol.toml"
                 raise WrongValue(f"board.{name}", value, f"a setting of the board; {hint}")
             item = CONFIG[name]
             if not item.least <= value <= item.greatest:

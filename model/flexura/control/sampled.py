@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..io import Tables, array, function_of, tick_rate
+from ..io import Tables, array, function_of, takes, tick_rate
 from ..signals import Loads
 from ..system import RunStates, System, sensor_channels
 
@@ -71,18 +71,19 @@ class DriveFunction:
     ) -> None:
         self.function, self.joints, self.of_state = function, joints, False
         try:
-            parameters = inspect.signature(function).parameters.values()
+            parameters = list(inspect.signature(function).parameters.values())
         except (TypeError, ValueError):
-            parameters = ()  # type: ignore[assignment]
+            parameters = []
         needed = [
             p
             for p in parameters
             if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty
         ]
-        if len(needed) not in (1, 4):
+        gathers = any(p.kind is p.VAR_POSITIONAL for p in parameters)
+        self.of_time = len(needed) == 1 and not gathers
+        if not (self.of_time or len(needed) == 4 or (parameters and takes(function, 4))):
             expected = "expected a function of (t) or of (t, position, velocity, tip_deflection)"
             raise InputError(expected, key="drive", value=function)
-        self.of_time = len(needed) == 1
         if system is not None and (asked := asked_measurements(function)):
             self.function, self.of_state = _Measured(self, system, asked, loads), True
             self.of_time = False

@@ -36,7 +36,7 @@ import numpy as np
 
 from .. import core
 from ..errors import InputError
-from ..io import Run
+from ..io import Run, number
 
 RISE, SETTLING, OVERSHOOT, ERROR, ITAE, EFFORT = range(6)  # columns of a joint's figures
 PEAK, RESIDUAL, VIBRATION, RMS = range(4)  # of the strip's
@@ -155,12 +155,16 @@ def step_figures(
         rise_s, settling_s, overshoot [1], error [1]; None for what never happened.
 
     Raises:
-        InputError: no such channel, or no two samples after the start, or nothing to go.
+        InputError: no such channel, a target or start that is no finite number, no two samples
+            after the start, or nothing to go.
     """
     if channel not in run:
         raise InputError(
             f"expected a channel of the run: {', '.join(run)}", key="channel", value=channel
         )
+    for key, value in (("target", target), ("start", start)):
+        if value is not None:
+            number(value, key)
     reference = run.channels.get(channel.replace("/position", "/reference"))
     asked = None if reference is None or not channel.endswith("/position") else reference
     there = np.isfinite(run[channel])

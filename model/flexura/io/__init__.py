@@ -53,7 +53,7 @@ from .seal import (
 from .shipped import find, shipped_files
 from .toml_files import Tables, changed, index_of, read_toml, write_toml
 from .trust import DOUBTED, REFUSED, balance_events, interruption, judged
-from .validation import FORMAT, MOST_LETTERS, check_format, explain, is_name
+from .validation import FORMAT, MOST_LETTERS, check_format, explain, is_name, meant
 
 __all__ = [
     "CHANNELS",
@@ -95,6 +95,7 @@ __all__ = [
     "leftovers",
     "linked",
     "make_folder",
+    "meant",
     "number",
     "path_of",
     "put",

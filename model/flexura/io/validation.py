@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -13,6 +13,7 @@ from ..errors import InputError, WrongValue
 
 FORMAT = 1  # of the project's files, the one that is written
 MOST_LETTERS = 200
+MOST_MEANT = 5  # keys that a message suggests
 
 
 def is_name(value: Any) -> bool:
@@ -28,6 +29,37 @@ def is_name(value: Any) -> bool:
         return False
     kinds = map(unicodedata.category, value)
     return not any(kind.startswith("C") or kind in ("Zl", "Zp") for kind in kinds)
+
+
+# what else the field calls a key
+SYNONYMS = {
+    "zeta": "ratio",
+    "xi": "ratio",
+    "E": "young_modulus_Pa",
+    "EI": "bending_stiffness_N_m2",
+    "rho": "density_kg_m3",
+}
+
+
+def meant(key: str, known: Iterable[str]) -> str:
+    """The keys that a wrong one may stand for.
+
+    Args:
+        key: as it was given.
+        known: those that its table may have.
+
+    Returns:
+        A synonym, else all that begin with it, else the one whose spelling is nearest, for example
+        "kp_1_V_m or kp_1_N_m"; "" where there is none.
+    """
+    names = list(known)
+    if SYNONYMS.get(key) in names:
+        return SYNONYMS[key]
+    for begin in (f"{key}_", key) if key else ():
+        longer = [name for name in names if name.startswith(begin)]
+        if 1 <= len(longer) <= MOST_MEANT:
+            return " or ".join(longer)
+    return " ".join(difflib.get_close_matches(key, names, 1, 0.6))
 
 
 def explain(
@@ -81,9 +113,12 @@ def explain(
         )
     key = ".".join(keys) or "the file"
     if first["type"] == "extra_forbidden":
-        names = list(table.model_fields) if table is not None else []
-        near = difflib.get_close_matches(keys[-1], names, 1, 0.6)
-        hint = f"did you mean {near[0]}?" if near else f"known here: {', '.join(names)}"
+        given = _at(data, first["loc"][:-1])
+        known = getattr(table, "keys_beside", lambda _: table.model_fields if table else [])(given)
+        near = meant(keys[-1], known)
+        hint = f"did you mean {near}?" if near else f"known here: {', '.join(known)}"
+        if near in given:
+            hint += " It is there too"
         return InputError(f"an unknown key; {hint}", key=key, value=value, file=file, more=more)
     if first["type"] == "missing":
         return InputError(f"missing: expected {expected}", key=key, file=file, more=more)
@@ -114,6 +149,16 @@ def _misspelt(problems: list[Any]) -> Any:
         ),
         None,
     )
+
+
+def _at(data: Any, loc: tuple[int | str, ...]) -> Mapping[str, Any]:
+    """The table at a place, without the names of a union's branches, which are no keys."""
+    for part in loc:
+        try:
+            data = data[part]
+        except (KeyError, IndexError, TypeError):
+            continue
+    return data if isinstance(data, Mapping) else {}
 
 
 def _fits(loc: tuple[int | str, ...], value: Any) -> bool:

@@ -135,9 +135,9 @@ class Batch:
             for key, values in changes.items()
         }
         counts = {len(values) for values in columns.values()}
-        if len(counts) != 1:
+        if len(counts) != 1 or counts == {0}:
             raise InputError(
-                "expected one or more keys with equally many values",
+                "expected one or more keys with equally many values, at least one",
                 key="changes",
                 value=sorted(counts),
             )

@@ -3,6 +3,7 @@ slide."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
@@ -117,6 +118,13 @@ class Joint(Table):
         None, description="a table { stiffness_N_m_rad, damping_N_m_s_rad, gear_ratio }"
     )
     locked: bool = Field(False, description="true (the joint is clamped at its start) or false")
+
+    @classmethod
+    def keys_beside(cls, given: Mapping[str, Any]) -> list[str]:
+        """The keys that a joint of the type that is given may have."""
+        pairs = KEYS.values() if given.get("type") in ("R", "Pa", "Pb") else ()
+        wrong = {sliding if given["type"] == "R" else turning for turning, sliding in pairs}
+        return [key for key in cls.model_fields if key not in wrong]
 
     @model_validator(mode="after")
     def _consistent(self) -> Joint:

@@ -220,7 +220,7 @@ def _drive(data: Tables, joints: int, duration: float) -> Drive:
         motion = from_spec(entry["motion"], key=f"{key}.motion") if "motion" in entry else None
         gains = [
             _number(
-                entry, k, "a gain of 0 or more", key=f"{key}.", low=-0.0, default=0.0, closed=True
+                entry, k, "a gain from 0 to 1e12", key=f"{key}.", low=-0.0, default=0.0, closed=True
             )
             for k in ("kp", "kd")
         ]

@@ -237,6 +237,10 @@ def test_step_figures_of_any_run():
     alone = Run(t + 5000, {"sensor/laser": channels["joint/1/position"]}, {"sensor/laser": "m"})
     again = step_figures(alone, "sensor/laser", start=5000.0)
     assert again["overshoot"] == pytest.approx(found["overshoot"], rel=1e-3)
+    for key in ("target", "start"):
+        for wrong in (np.nan, "1"):
+            with pytest.raises(fx.InputError, match=f"{key} = .*expected a finite number"):
+                step_figures(alone, "sensor/laser", **{key: wrong})
 
 
 @pytest.mark.slow

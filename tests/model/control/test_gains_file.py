@@ -70,6 +70,11 @@ def test_a_gains_file_is_the_controller_that_it_names(tmp_path):
         ("kd_2 = 0.1", "feedback_2 = 7", "controller.feedback_2"),
         ("kd_2 = 0.1", "delay_2_s = 0.0012", "controller.delay_2_s"),
         ("kd_2 = 0.1", "voltage_max_1_V = 5.0", "controller.voltage_max_1_V"),
+        (
+            'kind = "motor"\nforce_per_V = 13.1\ndamping = 1180.0',
+            'kind = "force"',
+            "output[1].kind",
+        ),
         ("[[output]]", '[[output]]\nkind = "stepper"\n' * 2 + "[[output]]", "output"),
     ],
 )
@@ -80,6 +85,23 @@ def test_a_wrong_gains_file_is_refused_by_key(tmp_path, old, new, key):
     with pytest.raises(fx.InputError) as caught:
         gains.load(path)
     assert caught.value.key == key and caught.value.file == str(path)
+
+
+@pytest.mark.parametrize(
+    "old, new, said",
+    [
+        ("kp_1_V_m", "kp_1", "did you mean kp_1_V_m or kp_1_V_rad?"),
+        ("ki_1_V_m_s", "ki_1", "did you mean ki_1_V_m_s?"),
+        ("kp_2_1_s", "kp_2", "did you mean kp_2_1_s?"),
+        ("kd_2 ", "kdd_2 ", "did you mean kd_2?"),
+    ],
+)
+def test_a_name_is_suggested_that_fits_its_joint(tmp_path, old, new, said):
+    path = tmp_path / "gains.toml"
+    path.write_text(FILE.replace(old, new))
+    with pytest.raises(fx.InputError, match="unknown setting") as caught:
+        gains.load(path)
+    assert said in str(caught.value)
 
 
 def test_units_of_the_other_kind_of_joint_are_refused(tmp_path):

@@ -141,6 +141,24 @@ VALUES = {
         0.1,
         "did you mean alpha_1_s?",
     ),
+    "another word for a key": (
+        {STRIP + "damping.zeta": 0.1},
+        "link[2].damping.zeta",
+        0.1,
+        "did you mean ratio?",
+    ),
+    "the beginning of two keys": (
+        {STRIP + "joint.spring": {"stiff": 1.0}},
+        "link[2].joint.spring.stiff",
+        1.0,
+        "did you mean stiffness_N_m_rad or stiffness_N_m?",
+    ),
+    "an old key beside the new one": (
+        {STRIP + "joint.start": 0.1, STRIP + "joint.start_rad": 0.2},
+        "link[2].joint.start",
+        0.1,
+        "did you mean start_rad? It is there too",
+    ),
     "a misspelt key of the payload": (
         {"payload.mass": 1.0},
         "payload.mass",

@@ -198,14 +198,23 @@ WRONG_MANOEUVRES = {
     "a negative gain": (
         "kp = 6.0",
         "kp = -6.0",
-        "joint[2].kp = -6.0: expected a gain of 0 or more",
+        "joint[2].kp = -6.0: expected a gain from 0 to 1e12",
     ),
     "a gain as text": (
         "kd = 0.25",
         'kd = "0.25"',
-        "joint[2].kd = '0.25': expected a gain of 0 or more",
+        "joint[2].kd = '0.25': expected a gain from 0 to 1e12",
     ),
-    "an endless gain": ("kd = 0.25", "kd = inf", "joint[2].kd = inf: expected a gain of 0 or more"),
+    "a gain beyond all bounds": (
+        "kd = 0.25",
+        "kd = 1e300",
+        "joint[2].kd = 1e+300: expected a gain from 0 to 1e12",
+    ),
+    "an endless gain": (
+        "kd = 0.25",
+        "kd = inf",
+        "joint[2].kd = inf: expected a gain from 0 to 1e12",
+    ),
     "gains without a motion": (
         M,
         "",

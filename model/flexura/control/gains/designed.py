@@ -16,7 +16,6 @@ torque_max_1_N_m = 1.0
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 from collections.abc import Sequence
@@ -24,7 +23,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...errors import InputError
-from ...io import MOST_HZ, write_toml
+from ...io import MOST_HZ, meant, write_toml
 from ...robot import Robot
 from ...signals import PLAUSIBLE, Signal, is_plausible
 from ..linear_quadratic.lqg_design import lqg
@@ -272,8 +271,9 @@ def _check_setting(name: str, value: Any, kind: str) -> None:
     key = f"controller.{name}"
     if not design_setting(name, kind):
         words = [f"{w}_1_{u}" for w, (_, *units) in JOINT.items() for u in units if u]
-        near = difflib.get_close_matches(name, [*words, *OF_ALL, *COUNTS, "rate_Hz"], 1, 0.6)
-        hint = f"; did you mean {near[0]}?" if near and design_setting(near[0], kind) else ""
+        known = [*words, *OF_ALL, *COUNTS, "rate_Hz"]
+        near = meant(name, [each for each in known if design_setting(each, kind)])
+        hint = f"; did you mean {near}?" if near else ""
         raise InputError(f'an unknown setting of type = "{kind}"{hint}', key=key, value=value)
     if not is_plausible(value):
         raise InputError(f"expected {PLAUSIBLE}", key=key, value=value)

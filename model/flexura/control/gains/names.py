@@ -2,6 +2,8 @@
 rad/s, and in the model only N or N m (`kp_1_N_m_rad`). The terms are those of (70).
 """
 
+from collections.abc import Iterable
+
 MAX_JOINTS = 9
 # names of PID's fields, {} the joint's number, by output
 ENDS = {
@@ -149,3 +151,22 @@ def _names() -> dict[str, list[tuple[int, str, str]]]:
 
 
 NAMES = _names()
+
+
+def fitting(given: Iterable[str]) -> list[str]:
+    """The names that may stand beside others: their joint has the same output.
+
+    Args:
+        given: names; unknown ones do not count.
+
+    Returns:
+        The names, without those that are given.
+    """
+    outputs: dict[int, set[str]] = {}
+    for name in given:
+        for i in {joint for joint, _, _ in NAMES.get(name, [])}:
+            own = {kind for joint, kind, _ in NAMES[name] if joint == i}
+            outputs[i] = outputs.get(i, set(ENDS)) & (own if "" not in own else set(ENDS))
+    fits = lambda i, kind: kind == "" or kind in outputs.get(i, ENDS)
+    known = [name for name, uses in NAMES.items() if any(fits(i, kind) for i, kind, _ in uses)]
+    return [name for name in (*known, *SHARED) if name not in set(given)]

@@ -18,17 +18,16 @@ holds a design instead, which `designed.py` describes.
 
 from __future__ import annotations
 
-import difflib
 import os
 from dataclasses import fields
 from typing import Any
 
 from ...errors import InputError
-from ...io import Tables, find, read_toml
+from ...io import Tables, find, meant, read_toml
 from ...signals import PLAUSIBLE, constant, is_plausible
 from ..pid import Force, Motor, Output, Stepper
 from .designed import Designed, read_design
-from .names import BOARDS, NAMES, SHARED
+from .names import BOARDS, NAMES, SHARED, fitting
 from .settings import OUTPUTS, Gains
 
 
@@ -87,8 +86,8 @@ def _gains(data: Tables, file: str) -> Gains:
     settings = {}
     for key, value in table.items():
         if key not in NAMES and key not in SHARED:
-            near = difflib.get_close_matches(key, [*NAMES, *SHARED], 1, 0.6)
-            hint = f"; did you mean {near[0]}?" if near else "; see docs/reference/gains-file.md"
+            near = meant(key, fitting(table))
+            hint = f"; did you mean {near}?" if near else "; see docs/reference/gains-file.md"
             raise InputError(f"an unknown setting{hint}", key=f"controller.{key}", value=value)
         if not is_plausible(value):
             raise InputError(f"expected {PLAUSIBLE}", key=f"controller.{key}", value=value)
@@ -110,6 +109,10 @@ def _gains(data: Tables, file: str) -> Gains:
     if len(tables) > len(gains.kinds):
         expected = f"expected at most {len(gains.kinds)} tables [[output]], one a joint"
         raise InputError(expected, key="output", value=len(tables))
+    for i, (entry, own) in enumerate(zip(tables, gains.kinds, strict=False), 1):
+        if entry["kind"] != (kind := own.rpartition(" ")[2]):
+            expected = f'expected "{kind}", by the units of the settings of joint {i}'
+            raise InputError(expected, key=f"output[{i}].kind", value=entry["kind"])
     try:
         gains.controller([_REST] * len(gains.kinds), [o or _ANYTHING[k] for k, o in _padded(gains)])
     except InputError as error:
