@@ -193,7 +193,7 @@ def test_the_good_arguments_are_good():
 
 
 def test_a_batch_of_no_robots_is_refused():
-    with pytest.raises(fx.InputError, match="changes = .*at least one"):
+    with pytest.raises(fx.InputError, match=r"changes = .*at least one"):
         fx.Batch.vary(RIG, {"payload.mass_kg": []})
 
 

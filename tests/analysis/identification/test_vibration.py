@@ -239,7 +239,7 @@ def test_step_figures_of_any_run():
     assert again["overshoot"] == pytest.approx(found["overshoot"], rel=1e-3)
     for key in ("target", "start"):
         for wrong in (np.nan, "1"):
-            with pytest.raises(fx.InputError, match=f"{key} = .*expected a finite number"):
+            with pytest.raises(fx.InputError, match=rf"{key} = .*expected a finite number"):
                 step_figures(alone, "sensor/laser", **{key: wrong})
 
 

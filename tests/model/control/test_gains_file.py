@@ -90,7 +90,7 @@ def test_a_wrong_gains_file_is_refused_by_key(tmp_path, old, new, key):
 @pytest.mark.parametrize(
     "old, new, said",
     [
-        ("kp_1_V_m", "kp_1", "did you mean kp_1_V_m or kp_1_V_rad?"),
+        ("kp_1_V_m", "kp_1", "did you mean kp_1_V_m?"),
         ("ki_1_V_m_s", "ki_1", "did you mean ki_1_V_m_s?"),
         ("kp_2_1_s", "kp_2", "did you mean kp_2_1_s?"),
         ("kd_2 ", "kdd_2 ", "did you mean kd_2?"),
