@@ -97,7 +97,8 @@ def crosscheck_nine(
                 file=FILES[name],
             )
     done: dict[str, Row] = {}
-    with ProcessPoolExecutor(min(len(FILES), os.cpu_count() or 1)) as pool:
+    pool = ProcessPoolExecutor(min(len(FILES), os.cpu_count() or 1))
+    try:
         work = {
             pool.submit(_one, name, robot)
             for name, robot in sorted(described.items(), key=lambda k: -k[0].count("Pb"))
@@ -106,6 +107,8 @@ def crosscheck_nine(
             row = finished.result()
             done[row.structure] = row
             progress(len(done) / len(FILES))
+    finally:
+        pool.shutdown(cancel_futures=True)
     return [done[name] for name in FILES]
 
 

@@ -254,7 +254,8 @@ def test_motions_are_followed_exactly_by_both_programs(warm, tmp_path):
     assert run["joint/2/position"][-1] == pytest.approx(0.3, abs=5e-3)
 
 
-def test_ctrl_c_stores_what_there_is_and_marks_it_incomplete(warm, tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_ctrl_c_stores_what_there_is_and_marks_it_incomplete(number, warm, tmp_path):
     """The interrupt comes when the progress bar shows that the solver is at work."""
     law = (
         LAW.read_text()
@@ -274,7 +275,7 @@ def test_ctrl_c_stores_what_there_is_and_marks_it_incomplete(warm, tmp_path):
             while not re.search(rb"[1-9]\d? %", shown):
                 assert time.monotonic() < deadline, shown
                 shown += os.read(terminal, 4096)
-            process.send_signal(signal.SIGINT)
+            process.send_signal(number)
             while True:  # until the other side is closed
                 try:
                     if not os.read(terminal, 4096):
@@ -288,6 +289,7 @@ def test_ctrl_c_stores_what_there_is_and_marks_it_incomplete(warm, tmp_path):
     run = fx.Run.read(tmp_path / "out")
     assert not run.complete and 1 < len(run) < 100001 and np.isfinite(run["tip/x"]).all()
     assert run.meta["events"][-1]["text"] == "interrupted"
+    assert not list(tmp_path.rglob(".flexura-*"))
 
 
 # --- inverse

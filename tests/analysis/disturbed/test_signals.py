@@ -39,7 +39,7 @@ def killed(name, place, times):
             command, work = ready(place, name)
             moment = chance.uniform(0.0, whole.seconds)
             ended = place.run(command, work, signal=int(number), after_s=moment)
-            by_itself = number == signal.SIGINT or not ended.sent
+            by_itself = number != signal.SIGKILL or not ended.sent
             ended_well(ended, work, killed=not by_itself or ended.status < 0)
             counts[f"{number.name} {ended.status}"] += 1
             if ended.status == 0:
