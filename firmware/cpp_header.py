@@ -86,7 +86,7 @@ def _settings(declared: dict[str, Any]) -> list[str]:
         ]
     out.append("};")
     rows = [
-        f"X({name}, {item['default']!r}f, {item['min']!r}f, {item['max']!r}f)"
+        f"X({name}, {', '.join(f'{float(item[key])!r}f' for key in ('default', 'min', 'max'))})"
         for name, item in items.items()
     ]
     return out + _rows(

@@ -16,6 +16,19 @@ class Mistake(Exception):
     """What is wrong in the declaration."""
 
 
+ONE_LINE = "one line of text without control characters and backslashes"
+
+
+def is_text(value: Any) -> bool:
+    """Whether a value can stand in a comment of C++ and in a row of a table."""
+    return isinstance(value, str) and value.isprintable() and "\\" not in value
+
+
+def cell(text: str) -> str:
+    """A text as a cell of a table in Markdown."""
+    return text.replace("|", r"\|").replace("<", "&lt;")
+
+
 def _runs(*runs: str) -> dict[str, str]:
     """Numbers of the Mega 2560 and their ports: '22 A0..7' means 22 = PA0 to 29 = PA7."""
     out = {}
@@ -90,7 +103,8 @@ STEP = Need(
     lambda port: COMPARE.get(port, "") if port in ("PL4", "PL5") else "",
 )
 EDGE = Need(
-    "an external interrupt (INT0 to INT3 at PD0 to PD3, INT4 to INT7 at PE4 to PE7)",
+    "an external interrupt (INT0 to INT3 at PD0 to PD3, INT4 at PE4, INT5 at PE5; INT6 at PE6 and "
+    "INT7 at PE7 have no header)",
     lambda port: INTERRUPTS.get(port, ""),
 )
 ANALOG = Need(
@@ -138,8 +152,9 @@ def port_of(entry: dict[str, Any]) -> str:
 def number_of(entry: dict[str, Any]) -> str:
     """The number printed on the board, or its port where the board has no number for it."""
     return str(
-        entry.get("pin")
-        or next((n for n, port in MEGA.items() if port == port_of(entry)), port_of(entry))
+        entry["pin"]
+        if "pin" in entry
+        else next((n for n, port in MEGA.items() if port == port_of(entry)), port_of(entry))
     )
 
 
@@ -158,20 +173,38 @@ def _check_place(name: str, entry: Any) -> None:
         raise Mistake(
             f"pins.{name}: expected port, bit and text, and pin if the board has a number for it"
         )
+    if not is_text(entry.get("text", "")):
+        raise Mistake(f"pins.{name}: text = {entry['text']!r}: expected {ONE_LINE}")
     port, bit = entry["port"], entry["bit"]
-    if port not in BITS or type(bit) is not int or not 0 <= bit < BITS[port]:
+    if (
+        not isinstance(port, str)
+        or port not in BITS
+        or type(bit) is not int
+        or not 0 <= bit < BITS[port]
+    ):
         raise Mistake(
             f"pins.{name}: port {port!r}, bit {bit!r}: the ATmega2560 has "
             "ports A to H, J, K and L with bits 0 to 7 (G: 0 to 5)"
         )
-    said = entry.get("pin")
-    if said and MEGA.get(str(said), str(said)) != port_of(entry):
+    said = entry.get("pin", port_of(entry))
+    if type(said) not in (str, int):
+        raise Mistake(f'pins.{name}: pin {said!r}: expected a number on the board, as "13" or "A0"')
+    if MEGA.get(str(said), str(said)) != port_of(entry):
         known = (
             f"pin {said} is {MEGA[str(said)]}"
             if str(said) in MEGA
-            else f"the Mega 2560 has no pin {said}"
+            else f"the Mega 2560 has no pin {str(said) or repr(said)}"
         )
         raise Mistake(f"pins.{name}: {known}, not {port_of(entry)}; say which of the two is meant")
+
+
+def without_header(pins: dict[str, Any]) -> list[str]:
+    """A sentence for each function at a port that an Arduino Mega 2560 leads nowhere."""
+    return [
+        f"pins.{name}: {port_of(entry)} has no header on the Mega 2560; another board is needed"
+        for name, entry in pins.items()
+        if port_of(entry) not in MEGA.values()
+    ]
 
 
 def check(pins: dict[str, Any]) -> None:
@@ -290,5 +323,5 @@ def table(pins: dict[str, Any]) -> list[str]:
     rows = ["| name | Mega | port | unit | what |", "| --- | --- | --- | --- | --- |"]
     for name, entry in pins.items():
         cells = [f"`{name}`", number_of(entry), port_of(entry), unit_of(name, entry)]
-        rows.append(f"| {' | '.join(cells)} | {entry.get('text', '')} |")
+        rows.append(f"| {' | '.join(cells)} | {cell(entry.get('text', ''))} |")
     return rows

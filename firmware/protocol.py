@@ -22,7 +22,7 @@ import cpp_header
 import pins
 import python_module
 import wiring
-from layout import ENUMERATIONS, struct_format
+from layout import ENUMERATIONS, check_shape, struct_format
 from pins import Mistake
 
 FIRMWARE = Path(__file__).resolve().parent
@@ -99,7 +99,8 @@ def readme(declared: dict[str, Any], text: str) -> str:
         "pins": pins.table(declared["pins"]),
         "faults": ["| number | fault | meaning | what to do |", "| --- | --- | --- | --- |"]
         + [
-            f"| {entry['code']} | `{name}` | {entry['text']} | {entry['remedy']} |"
+            f"| {entry['code']} | `{name}` | {pins.cell(entry['text'])} | "
+            f"{pins.cell(entry['remedy'])} |"
             for name, entry in faults.items()
             if entry["code"]
         ],
@@ -118,13 +119,16 @@ def generated() -> dict[Path, str]:
     """Every file that is made of the declaration, with its text. Raises Mistake."""
     try:
         declared = tomllib.loads(SOURCE.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as wrong:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as wrong:
         raise Mistake(str(wrong)) from None
     try:
+        check_shape(declared)
         left_out = with_second_motor(declared)
         check(declared)
         if left_out:
             print(f"{SOURCE.name}: {left_out}", file=sys.stderr)
+        for note in pins.without_header(declared["pins"]):
+            print(f"{SOURCE.name}: {note}", file=sys.stderr)
         hashed = digest(declared)
         return {
             HEADER: cpp_header.header(declared, hashed, SAID),

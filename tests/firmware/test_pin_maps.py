@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from pin_maps import ROOT, build, checkout, declare, declared, illegal, legal, pins, place
+from pin_maps import ROOT, build, checkout, declare, declared, illegal, legal, pins, place, protocol
 
 SLOW = pytest.mark.slow
 pytestmark = pytest.mark.timeout(1200)  # ten seconds of a processor, minutes of a busy one
@@ -110,6 +110,64 @@ def test_a_function_that_is_missing_or_unknown_is_named():
     wanted = declared() | {"limit_left": {"port": "A", "bit": 0, "text": ""}}
     with pytest.raises(pins.Mistake, match=r"pins\.limit_left: no such function"):
         pins.check(wanted)
+
+
+LAMP = 'lamp = { pin = "13", port = "B", bit = 7, text = "off Idle'
+IDLE = 'idle = { code = 0, text = "Outputs off.'
+WRONG = {
+    "a list for a port": (LAMP, LAMP.replace('"B"', '["B"]'), "pins.lamp: port ['B']"),
+    "a list for a pin": (LAMP, LAMP.replace('"13"', "[13]"), "pins.lamp: pin [13]: expected"),
+    "pin 0 elsewhere": (LAMP, LAMP.replace('"13"', "0"), "pins.lamp: pin 0 is PE0, not PB7"),
+    "no pin": (LAMP, LAMP.replace('"13"', '""'), "pins.lamp: the Mega 2560 has no pin ''"),
+    "pin false": (LAMP, LAMP.replace('"13"', "false"), "pins.lamp: pin False: expected"),
+    "two lines": (LAMP, LAMP.replace("off Idle", r"a\nint x;"), "pins.lamp: text = "),
+    "a backslash": (LAMP, LAMP.replace("off Idle", r"a\\ "), "pins.lamp: text = "),
+    "a tab": (IDLE, IDLE.replace("Outputs", r"\t"), "states.idle.text = "),
+    "a number for a text": (IDLE, IDLE.replace('"Outputs off.', '5 } # "'), "states.idle.text = 5"),
+    "a text for a code": (IDLE, IDLE.replace("0", '"0"'), "states.idle.code = '0': expected a wh"),
+    "no code": (IDLE, IDLE.replace("code = 0, ", ""), "states.idle.code: missing"),
+    "a list of pins": ("[pins]\n", "[[pins]]\n", "pins = [{'motor_forward'"),
+    "a list of a table": ("[faults]\n", "[[faults]]\n", "faults = [{'none'"),
+    "a number for a table": (IDLE, f"idle = 3 # {IDLE}", "states.idle = 3: expected a table"),
+    "a text for a constant": (
+        "duty_full = 800",
+        'duty_full = "800"',
+        "constants.duty_full = '800'",
+    ),
+    "no list of fields": ("fields = [", "fields = 3 #[", "message[1].fields = 3"),
+    "no length": ('"u8[3]"', '"u8[x]"', "type 'u8[x]': expected one of"),
+    "a name that is none": ("idle = {", '"a b" = {', "states.a b: the name 'a b': expected"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "said"), WRONG.values(), ids=WRONG)
+def test_a_wrong_declaration_is_one_sentence(old, new, said, tmp_path, monkeypatch, capsys):
+    text = protocol.SOURCE.read_text(encoding="utf-8")
+    assert old in text
+    text = text.replace(old, new, 1)
+    if new == "fields = 3 #[":
+        begin = text.index(new)
+        text = text[: begin + len("fields = 3")] + text[text.index("]\n\n", begin) + 1 :]
+    monkeypatch.setattr(protocol, "SOURCE", tmp_path / "protocol.toml")
+    protocol.SOURCE.write_text(text, encoding="utf-8")
+    assert protocol.main(["--check"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("protocol.toml: ") and said in err and err.count("\n") == 1, err
+
+
+def test_a_port_without_a_header_is_said(tmp_path, monkeypatch, capsys):
+    """A chip on another board than the Mega may serve: it is a note."""
+    text = protocol.SOURCE.read_text(encoding="utf-8")
+    monkeypatch.setattr(protocol, "SOURCE", tmp_path / "protocol.toml")
+    new = LAMP.replace('pin = "13", port = "B"', 'port = "J"')
+    protocol.SOURCE.write_text(text.replace(LAMP, new), encoding="utf-8")
+    assert protocol.main(["--check"]) == 1
+    assert "pins.lamp: PJ7 has no header on the Mega 2560" in capsys.readouterr().err
+
+
+def test_texts_break_no_table():
+    table = pins.table({"lamp": {"port": "B", "bit": 7, "text": "on | off <!-- pins: end -->"}})
+    assert table[-1].endswith(r"on \| off &lt;!-- pins: end --> |")
 
 
 @pytest.mark.parametrize("seed", range(3))
