@@ -149,6 +149,7 @@ def main() -> None:
         if number is not None and signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, _interrupt)
     try:
+        _refuse_empty(sys.argv[1:])
         app()
     except KeyboardInterrupt:
         _end_interrupted()
@@ -167,6 +168,13 @@ def main() -> None:
             _end_interrupted()
         typer.echo(f"flexura: {error}", err=True)
         sys.exit(2 if isinstance(error, InputError) else 1)
+
+
+def _refuse_empty(words: list[str]) -> None:
+    """An empty text is no file and no folder: a variable of a script may not be set."""
+    for before, word in zip(["flexura", *words], words, strict=False):
+        if not word and before != "--title":
+            raise InputError("an empty argument: expected a file, a name or a value", key=before)
 
 
 def _open_closed_streams() -> None:

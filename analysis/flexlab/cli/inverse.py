@@ -28,7 +28,7 @@ def inverse(
     ],
     out: Out = None,
     rtol: Rtol = 1e-7,
-    method: Annotated[str, typer.Option(help="auto, explicit or implicit")] = "auto",
+    method: Annotated[str, typer.Option(help="auto, explicit, implicit or exponential")] = "auto",
     max_steps: MaxSteps = None,
     wall_time: WallTime = None,
     force: Force = False,

@@ -21,24 +21,44 @@ from .results import results
 MANOEUVRE = "manoeuvre.toml"
 
 
+def _numbers(param: typer.CallbackParam, value: Any) -> Any:
+    """Refuse texts of an option that takes several numbers, as before anything else that is
+    wrong: too few of them take the next option in."""
+    try:
+        _floats(value)
+    except ValueError:
+        expected = f"expected {len(value)} numbers, {param.metavar}"
+        raise fx.InputError(expected, key=param.opts[0], value=" ".join(value)) from None
+    return value
+
+
+def _floats(texts: tuple[str, ...] | None) -> Any:
+    return None if texts is None else tuple(map(float, texts))
+
+
 def invert(
     robot: RobotFile,
     line: Annotated[
-        tuple[float, float, float, float] | None,
-        typer.Option(metavar="X Y X Y", help="a straight way from place to place [m]"),
+        tuple[str, str, str, str] | None,
+        typer.Option(
+            metavar="X Y X Y", callback=_numbers, help="a straight way from place to place [m]"
+        ),
     ] = None,
     circle: Annotated[
-        tuple[float, float, float] | None,
-        typer.Option(metavar="X Y RADIUS", help="once round a circle, from its right [m]"),
+        tuple[str, str, str] | None,
+        typer.Option(
+            metavar="X Y RADIUS", callback=_numbers, help="once round a circle, from its right [m]"
+        ),
     ] = None,
     point: Annotated[
         list[str] | None,
         typer.Option(metavar="X,Y", help="a corner of straight ways [m]; two or more"),
     ] = None,
     angle: Annotated[
-        tuple[float, float] | None,
+        tuple[str, str] | None,
         typer.Option(
             metavar="FROM TO",
+            callback=_numbers,
             help="of a robot with one joint: polar angle of the tip [rad], or its place along the "
             "rail [m]",
         ),
@@ -78,20 +98,20 @@ def invert(
         raise fx.InputError(
             f"expected one of {', '.join(given)}", key="path", value=", ".join(asked) or "none"
         )
-    _check_numbers(duration, step, angle)
+    ends, ring, span = map(_floats, (line, circle, angle))
+    _check_numbers(duration, step, span)
     t = np.linspace(0.0, duration, max(round(duration / step), 1) + 1)
     tip: Any
     if table is not None:
         t, tip = _columns(table)
-    elif line is not None:
-        tip = fx.signals.paths.line(line[:2], line[2:], duration)
-    elif circle is not None:
-        tip = fx.signals.paths.circle(circle[:2], circle[2], duration)
+    elif ends is not None:
+        tip = fx.signals.paths.line(ends[:2], ends[2:], duration)
+    elif ring is not None:
+        tip = fx.signals.paths.circle(ring[:2], ring[2], duration)
     elif point:
         tip = fx.signals.paths.polyline([_place(p) for p in point], duration)
     else:
-        assert angle is not None
-        low, high = angle
+        low, high = span
         tip = lambda s: low + (high - low) * fx.signals.paths.smooth_rise(s / duration)
     with results(out, "invert", robot.stem, force=force) as draft:
         with progress_bars("invert") as report:

@@ -29,7 +29,7 @@ from flexura.control import (
     filter_coefficient,
 )
 from flexura.errors import InputError
-from flexura.io import read_toml
+from flexura.io import meant, read_toml
 from flexura.signals import is_finite
 
 COLUMNS = {name: k for k, name in enumerate(GAINS)} | {
@@ -87,7 +87,9 @@ def free_gain(name: str, low: Any, high: Any, scale: str | None = None) -> FreeG
         InputError: the name is unknown, or the bounds do not fit.
     """
     if name not in NAMES and name not in _FILTERS and not design_setting(name):
-        expected = "expected a setting of a gains file, see firmware/README.md, the controller"
+        near = meant(name, [*NAMES, *_FILTERS])
+        hint = f"did you mean {near}?" if near else "for example kp_1_N_m_rad"
+        expected = f"expected a setting of a gains file; {hint}"
         raise InputError(expected, key=f"free.{name}", value=name)
     if not (is_finite(low) and is_finite(high) and low < high):
         raise InputError(

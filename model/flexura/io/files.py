@@ -129,12 +129,26 @@ def replaced(path: str | os.PathLike[str], *, new: bool = False) -> Iterator[Pat
 
 
 def linked(path: str | os.PathLike[str]) -> Path:
-    """The file that a link leads to, there or not; any other path as it is."""
+    """The file that a link leads to, there or not.
+
+    Args:
+        path: a link, or any other path.
+
+    Returns:
+        The file; any other path as it is.
+    """
     return Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
 
 
 def draft_of(path: Path) -> Path:
-    """A new name beside a file, with its extension."""
+    """A new name beside a file, with its extension.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        The path with the new name.
+    """
     return path.with_name(f"{DRAFT}{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix[:20]}")
 
 

@@ -121,7 +121,14 @@ class Joint(Table):
 
     @classmethod
     def keys_beside(cls, given: Mapping[str, Any]) -> list[str]:
-        """The keys that a joint of the type that is given may have."""
+        """The keys that a joint may have.
+
+        Args:
+            given: its table; with a type, keys of the other joints are left out.
+
+        Returns:
+            The keys.
+        """
         pairs = KEYS.values() if given.get("type") in ("R", "Pa", "Pb") else ()
         wrong = {sliding if given["type"] == "R" else turning for turning, sliding in pairs}
         return [key for key in cls.model_fields if key not in wrong]

@@ -27,6 +27,10 @@ WRONG = {
     ),
     "one place": ("rig --point 0.38,0.1", "points = [[0.38, 0.1]]: expected two places"),
     "a place of one number": ("rig --point 0.38", "--point = '0.38': expected two numbers, X,Y"),
+    "three numbers of four": (
+        "rig --line 0.6 0.1 0.5 --out x",
+        "--line = '0.6 0.1 0.5 --out': expected 4 numbers, X Y X Y",
+    ),
     "no radius": ("rig --circle 0.38 0.1 0", "radius = 0.0: expected a radius above 0"),
     "no time": ("single-r --angle 0 1 --duration 0", "--duration = 0.0: expected a time above 0"),
     "two paths": ("rig --angle 0 1 --line 0 0 1 1", "path = '--line, --angle': expected one of"),

@@ -1,5 +1,7 @@
 """Slips of the first day: files in the wrong place, a word that is nearly right, a number alone."""
 
+import shlex
+
 import pytest
 
 import flexura as fx
@@ -39,12 +41,18 @@ def files(tmp_path, monkeypatch):
         ("simulate arm.toml arm.toml", "arm.toml: a robot file: expected a manoeuvre file"),
         ("tune arm.toml push.toml", "--controller: missing: expected ROBOT, MANOEUVRE and"),
         ("identify runs arm.toml --fit payload.mass_kg", "RUN = 'arm.toml': expected runs here"),
+        ("frequencies ''", "flexura: frequencies: an empty argument: expected a file"),
+        ("simulate arm.toml --out ''", "flexura: --out: an empty argument: expected a file"),
+        (
+            "tune arm.toml push.toml --controller rig --free kp_9=1:2",
+            "free.kp_9 = 'kp_9': expected a setting of a gains file; did you mean kp_9_V_m or",
+        ),
         ("frequencis arm.toml", "No such command 'frequencis'. Did you mean 'frequencies'?"),
     ],
 )
 def test_a_slip_is_answered_with_what_was_meant(files, line, words):
     before = sorted(path.name for path in files.iterdir())
-    done = run(line.split())
+    done = run(shlex.split(line))
     status, _, error = done
     assert status == 2 and words in " ".join(error.split())
     assert sorted(path.name for path in files.iterdir()) == before

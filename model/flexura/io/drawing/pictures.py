@@ -44,7 +44,14 @@ class NoPicture(FlexuraError):
 
 
 def plain(text: str) -> str:
-    """A text of a user or a file, as matplotlib shows it without mathematics."""
+    """A text of a user or a file for matplotlib, which shows it without mathematics.
+
+    Args:
+        text: the text.
+
+    Returns:
+        The text with its dollar signs marked.
+    """
     return text.replace("$", r"\$")
 
 
@@ -54,6 +61,9 @@ def attempted(name: str) -> Iterator[None]:
 
     Args:
         name: of its file.
+
+    Yields:
+        Nothing.
 
     Raises:
         NoPicture: it cannot be drawn.
@@ -78,6 +88,9 @@ def told(name: str = "the picture", *, letters: bool = True) -> Iterator[None]:
     Args:
         name: of the picture.
         letters: that no font has are an empty box; in an SVG the reader's fonts decide.
+
+    Yields:
+        Nothing.
     """
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", UserWarning)
