@@ -47,6 +47,10 @@ class Pin(NamedTuple):
 '''
 
 
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
 def _call(indent: str, name: str, arguments: list[str]) -> list[str]:
     """name(arguments),: on one line where 100 columns hold it, else one argument a line."""
     line = f"{indent}{name}({', '.join(arguments)}),"
@@ -63,21 +67,21 @@ def _messages(declared: dict[str, Any]) -> list[str]:
     out = ["", "MESSAGES: dict[str, Message] = {"]
     for message in declared["message"]:
         head = [
-            json.dumps(message["name"]),
+            _quoted(message["name"]),
             str(message["code"]),
-            json.dumps(struct_format(message)),
+            _quoted(struct_format(message)),
         ]
         fields = []
         for field in message["fields"]:
-            said = [json.dumps(field["name"]), json.dumps(field.get("unit", ""))]
+            said = [_quoted(field["name"]), _quoted(field.get("unit", ""))]
             fields.append(f"Field({', '.join([*said, str(split(field['type'])[1])])})")
         inner = f"({', '.join(fields)}{',' * (len(fields) == 1)})"
-        line = f"    {json.dumps(message['name'])}: Message({', '.join([*head, inner])}),"
+        line = f"    {_quoted(message['name'])}: Message({', '.join([*head, inner])}),"
         if len(line) <= 100:
             out.append(line)
             continue
         out += [
-            f"    {json.dumps(message['name'])}: Message(",
+            f"    {_quoted(message['name'])}: Message(",
             *(f"        {part}," for part in head),
         ]
         if len(inner) <= 90:
@@ -111,7 +115,7 @@ def module(declared: dict[str, Any], digest: int, said: str) -> str:
         "",
     ]
     out += ["from enum import IntEnum", "from typing import NamedTuple", ""]
-    out += [f"NAME = {json.dumps(declared['name'])}", f"VERSION = {declared['version']}"]
+    out += [f"NAME = {_quoted(declared['name'])}", f"VERSION = {declared['version']}"]
     out.append(f"DECLARATION = 0x{digest:08X}")
     out += [f"{name.upper()} = {value}" for name, value in declared["constants"].items()]
     for key, title in ENUMERATIONS.items():
@@ -120,11 +124,11 @@ def module(declared: dict[str, Any], digest: int, said: str) -> str:
     out += ["", "", "# What each means, and what the person at the bench does about it."]
     out.append("FAULTS: dict[Fault, tuple[str, str]] = {")
     for name, entry in declared["faults"].items():
-        pair = [json.dumps(entry[key]) for key in ("text", "remedy")]
+        pair = [_quoted(entry[key]) for key in ("text", "remedy")]
         out += _call("    ", f"Fault.{name}: ", pair)
     out += ["}", "", "RESULTS: dict[Result, str] = {"]
     out += [
-        f"    Result.{name}: {json.dumps(entry['text'])},"
+        f"    Result.{name}: {_quoted(entry['text'])},"
         for name, entry in declared["results"].items()
     ]
     out += ["}", "", _TYPES, *_messages(declared), "", "CONFIG: dict[str, Item] = {"]
@@ -132,14 +136,12 @@ def module(declared: dict[str, Any], digest: int, said: str) -> str:
         values = [
             str(number),
             *(repr(item[key]) for key in ("default", "min", "max")),
-            json.dumps(item["text"]),
+            _quoted(item["text"]),
         ]
-        out += _call("    ", f"{json.dumps(name)}: Item", values)
+        out += _call("    ", f"{_quoted(name)}: Item", values)
     out += ["}", "", f"PINS_HASH = 0x{hash_of_pins(declared['pins']):08X}"]
     out += ["PINS: dict[str, Pin] = {"]
     for name, entry in declared["pins"].items():
-        values = [json.dumps(number_of(entry)), json.dumps(entry["port"]), str(entry["bit"])]
-        out += _call(
-            "    ", f"{json.dumps(name)}: Pin", [*values, json.dumps(entry.get("text", ""))]
-        )
+        values = [_quoted(number_of(entry)), _quoted(entry["port"]), str(entry["bit"])]
+        out += _call("    ", f"{_quoted(name)}: Pin", [*values, _quoted(entry.get("text", ""))])
     return "\n".join([*out, "}", ""])

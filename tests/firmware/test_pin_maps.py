@@ -165,6 +165,14 @@ def test_a_port_without_a_header_is_said(tmp_path, monkeypatch, capsys):
     assert "pins.lamp: PJ7 has no header on the Mega 2560" in capsys.readouterr().err
 
 
+def test_any_letter_is_the_same_in_the_generated_module():
+    wanted = protocol.tomllib.loads(protocol.SOURCE.read_text(encoding="utf-8"))
+    wanted["pins"]["lamp"]["text"] = text = "手 \U0001f4a1"
+    made = {}
+    exec(protocol.python_module.module(wanted, 1, ""), made)
+    assert made["PINS"]["lamp"].text == text
+
+
 def test_texts_break_no_table():
     table = pins.table({"lamp": {"port": "B", "bit": 7, "text": "on | off <!-- pins: end -->"}})
     assert table[-1].endswith(r"on \| off &lt;!-- pins: end --> |")
