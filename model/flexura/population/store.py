@@ -181,10 +181,13 @@ class Store:
 
         Args:
             chunk: the chunk.
+
+        Raises:
+            InputError: another process put one of other robots there meanwhile.
         """
         if self.folder is None:
             self.kept[chunk.first] = chunk
-        else:
+        elif not self.has(chunk.first, chunk.digest):
             write_bytes(self._path(chunk.first), chunk.to_parquet())
 
     def has(self, first: int, digests: list[bytes]) -> bool:

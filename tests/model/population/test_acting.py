@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import flexura as fx
+from flexura.population.store import Chunk, Store
 from flexura.signals import Acting, harmonic
 from populations import same
 from robots import beam, rigid, robot
@@ -166,3 +167,23 @@ def test_a_load_on_a_link_that_no_robot_has_is_refused():
     with pytest.raises(fx.InputError) as refused:
         fx.simulate(fx.Batch.of([arm()]), T, DRIVE, loads=fx.Load(3, moment_N_m=1.0))
     assert refused.value.key == "load[1].link"
+
+
+def test_a_chunk_of_other_robots_is_not_replaced(tmp_path):
+    """Two calls began while the folder was empty; what each varies is not in its request."""
+    chunk = lambda *digests: Chunk(
+        0,
+        np.array(["done"] * len(digests)),
+        np.ones(len(digests)),
+        np.ones(len(digests), int),
+        [""] * len(digests),
+        list(digests),
+        {"a": np.zeros(len(digests))},
+    )
+    one, other = Store(tmp_path), Store(tmp_path)
+    one.put(chunk(b"a" * 16, b"b" * 16))
+    before = [path.read_bytes() for path in tmp_path.iterdir()]
+    with pytest.raises(fx.InputError, match="another robot or drive"):
+        other.put(chunk(b"a" * 16, b"c" * 16))
+    other.put(chunk(b"a" * 16, b"b" * 16))
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == before
