@@ -77,7 +77,7 @@ class Exponential : public Method<Real> {
     bool renewed = false;
     for (int k = 0; k < LANES; ++k) {
       if (lane(which, k) < 0.5 || !goes_on[k] || !excites_coupled_modes(k)) continue;
-      if (!take_modes(k, q, v, lane(t, k), false)) continue;
+      take_modes(k, q, v, lane(t, k), false);
       put_origin(k, q, v);
       transform_history(k), steps.forget_tables(k);
       renewed = true;
@@ -306,10 +306,10 @@ class Exponential : public Method<Real> {
   // constant, and no estimate from the values there sees the error.
   bool excites_coupled_modes(int k) const {
     const int now = steps.new_row(), before = steps.newest();
-    const double h = steps.length(k);
+    const double h = steps.length(k);  // (negative after modes were taken: nothing is unresolved)
     double sum = 0.0;
     bool unresolved = false;
-    for (int mode = 0; h > 0.0 && mode < n; ++mode) {
+    for (int mode = 0; mode < n; ++mode) {
       double coupled = lane(steps.N[now][mode], k) - lane(steps.N[before][mode], k);
       for (std::size_t j = 0; j < accounts.free_joints().size(); ++j)
         coupled -= lane(modes.phi[mode * modes.stride + accounts.free_joints()[j].row], k) *
@@ -420,8 +420,8 @@ class Exponential : public Method<Real> {
     }
   }
 
-  // Takes robot k's modes at q if they are poor there, or changed at all; true if so. The cutoff is
-  // found once, at the start.
+  // Takes robot k's modes at q, or only if they are poor there; true if so. The cutoff is found at
+  // the start.
   bool take_modes(int k, const Real *q, const Real *v, double t, bool if_poor = true) {
     Matrices &m = matrices;
     if (!c.plant.matrices(k, q, m.M.data(), m.K.data(), m.D.data()))

@@ -39,9 +39,8 @@ class ModalBasis {
   static constexpr int LANES = LanesOf<Real>::value;
   static constexpr double POOR =
       0.1;  // the change of Phi M Phi^T, and of Phi K Phi^T against w_i w_j, that is put up with
-  static constexpr double UNCHANGED = 1e-6;  // of that
-  static constexpr double TURN = 0.05;       // the configuration is looked at after so many radians
-                                             // (metres of the tips over the reach),
+  static constexpr double TURN = 0.05;  // the configuration is looked at after so many radians
+                                        // (metres of the tips over the reach),
   static constexpr double FAR =
       8.0;  // or as many times more, at most, where the modes were found to change slowly
   static constexpr double FREE = 1e-4;  // w2 below this is none [rad^2/s^2]
@@ -94,9 +93,9 @@ class ModalBasis {
     return !(way <= patience[k] * lane(plant.reach, k));
   }
 
-  // Takes modes of robot k from its matrices at q, if there are none or they are poor there (else
-  // if they have changed at all); true if so. `slow` [rad/s]: frequencies below it are as good as
-  // zero. zeta: of the damping added above the cutoff.
+  // Takes modes of robot k from its matrices at q, or only if there are none or they are poor
+  // there; true if so. `slow` [rad/s]: frequencies below it are as good as zero. zeta: of the
+  // damping added above the cutoff.
   bool take(int k, const Matrices &m, const Real *q, const bool *held_row, double slow, double zeta,
             bool if_poor = true) {
     for (int i = 0; i < n; ++i) set_lane(seen[i], k, lane(q[i], k));
@@ -117,7 +116,7 @@ class ModalBasis {
       const double changed = change(k, turned_M, turned_K, slow) / POOR;
       patience[k] = smaller(larger(0.7 * gone[k] * (1.0 / root(larger(changed, 1e-3)) - 1.0), TURN),
                             FAR * TURN);  // were it to grow as a square
-      if (changed < (if_poor ? 1.0 : UNCHANGED)) return false;
+      if (if_poor && changed < 1.0) return false;
       eigen_pencil(n, turned_K.data(), turned_M.data(), squares.data(),
                    half.data());  // nearly diagonal: soon done
       product(n, old, half, shapes);
