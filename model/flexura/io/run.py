@@ -22,7 +22,7 @@ from .drawing.over_time import figure, heading
 from .drawing.pictures import FORMS, saved
 from .files import path_of, refuse_taken, write_bytes
 from .frames import pandas_frame, xarray_dataset
-from .quantities import converted, fault, from_first, suffix, unit
+from .quantities import check_unit, converted, fault, from_first, suffix, unit
 from .run_file import FILE
 from .toml_files import Tables
 
@@ -46,7 +46,8 @@ class Run:
     of the calendar counts from the first sample; `meta["clock_start_s"]` keeps its first time.
 
     Raises:
-        InputError: times that are not finite, or do not ascend, by the row counted from 1.
+        InputError: times that are not finite, or do not ascend, by the row counted from 1; a unit
+            that may be one of two.
         ValueError: names, units and lengths that do not fit together.
     """
 
@@ -67,6 +68,7 @@ class Run:
                     f"channel {name} has shape {np.shape(values)}, the times have "
                     f"{np.shape(self.t)}"
                 )
+            check_unit(self.units[name], f"unit of {name}")
             if unit(self.units[name]) is None and not name.startswith("sensor/"):
                 raise ValueError(
                     f"channel {name} has the unit {self.units[name]!r}; known: s, m, rad, mm, deg, "
@@ -81,7 +83,8 @@ class Run:
 
     def _in_seconds(self) -> None:
         """Refuse a clock that is none; count from the first sample where it is a calendar's."""
-        wrong = fault(self.t, self.meta.get("source") == "experiment")
+        measured = self.meta.get("source") == "experiment" and "imported" not in self.meta
+        wrong = fault(self.t, measured)
         if wrong:
             raise InputError(wrong.text, key=f"row {wrong.row}")
         t, start = from_first(self.t)

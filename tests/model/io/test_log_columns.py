@@ -232,9 +232,8 @@ def test_dates_and_times_apart_in_parquet_are_one_clock(unit, tmp_path):
     step = 1.0 if unit == "s" else 0.05
     np.testing.assert_allclose(column.since, step * np.arange(9), atol=1e-12)
     assert column.values[0] == np.datetime64("2026-11-29", "s").astype(int)
-    if unit != "s":  # a row a second is too slow for a robot
-        found = understood(log, every=True)
-        assert found.clock == "'Date' and 'Clock'" and list(found.run) == ["sensor/n"]
+    found = understood(log, every=True)
+    assert found.clock == "'Date' and 'Clock'" and list(found.run) == ["sensor/n"]
 
 
 def test_a_channel_with_its_own_time_base_is_interpolated_beside_a_rate(tmp_path):

@@ -92,6 +92,24 @@ def test_heads_with_digits_are_heads(heads, tmp_path):
     assert not any(column.fault for column in found.columns)
 
 
+SCOPE = "Model,DS1054Z\nDate,2026-11-30\nRate,100\n"
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        f"{SCOPE}Note,two\ntime [s],{HEAD}\n",
+        f"{SCOPE}Note,two\n\ntime,joint/1/position\ns,deg\n",
+        f"{SCOPE}time,joint/1/position\n[s],[deg]\n",
+    ],
+)
+def test_a_preamble_of_as_many_cells_is_no_head(above, tmp_path):
+    path = written(tmp_path, above + "".join(f"{k / 100},{90 * k}\n" for k in range(20)))
+    log = read_log(path)
+    assert [column.name for column in log.columns] == ["time", "joint/1/position"]
+    assert understood(log).run["joint/1/position"][1] == np.pi / 2
+
+
 def test_a_row_that_became_a_comment_is_said(tmp_path):
     head, lines = german()
     lines[7] = "#" + lines[7][1:]

@@ -102,7 +102,7 @@ def timebase(log: Log, asked: Map | None, clock: Column | None, columns: list[Co
     if clock is not None:
         said = asked.time.unit if asked is not None and asked.time is not None else ""
         scale = (asked.time.scale, asked.time.offset) if asked and asked.time else (1.0, 0.0)
-        return from_column(log, clock, said or clock.unit, scale)
+        return from_column(log, clock, said, scale)
     own = [column for column in columns if column.clock in log.clocks]
     if not own:
         raise InputError(

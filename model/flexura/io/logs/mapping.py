@@ -8,7 +8,7 @@ from typing import Any
 
 from ...errors import InputError
 from ..arguments import number
-from ..quantities import unit
+from ..quantities import check_unit, meant, unit
 from ..toml_files import read_toml
 from ..validation import is_name
 
@@ -82,6 +82,8 @@ def _map(tables: dict[str, Any], name: str) -> Map:
         key = f'channel."{channel}"'
         if not is_name(channel) or not isinstance(table, dict):
             raise InputError("expected a table with column and unit", key=key, value=table)
+        if said := meant(channel):
+            raise InputError(f"an unknown channel; {said}", key=key)
         _known(table, _CHANNEL, key)
         channels[channel] = _source(table, key)
     if not channels:
@@ -107,6 +109,7 @@ def _source(table: dict[str, Any], name: str) -> Source:
     said = table.get("unit", "")
     if not isinstance(said, str) or ("unit" in table and not said.strip()):
         raise InputError('expected a unit, as "mm"', key=f"{name}.unit", value=said)
+    check_unit(said, f"{name}.unit")
     scale = number(table.get("scale", 1.0), f"{name}.scale")
     if scale == 0:
         raise InputError("expected a number other than 0", key=f"{name}.scale", value=scale)

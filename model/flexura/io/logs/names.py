@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from ..quantities import CHANNELS, unit
+from ..quantities import CHANNELS, is_unit
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
 _WORD = re.compile(r"(.*\S)\s+(?:in|/)\s+(\S+)")
@@ -42,7 +42,7 @@ def parted(head: str) -> tuple[str, str]:
         return found[1], found[2]
     for pattern in (_WORD, _STROKE):
         found = pattern.fullmatch(plain)
-        if found and known(plain) == "" and unit(found[2]) is not None:
+        if found and known(plain) == "" and is_unit(found[2]):
             return found[1], found[2]
     for tail, text in _TAILS:
         if plain.endswith(tail) and len(plain) > len(tail):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ..quantities import Unit, channel, unit
+from ..quantities import Unit, channel, check_unit, unit
 from ..run import Run
 from . import choice
 from .damage import changed, check_size, missing_rows
@@ -152,9 +152,10 @@ def _unit(log: Log, name: str, column: Column, source: Source) -> Unit:
     free = name.startswith("sensor/")
     if not said and (free or about.units == ("1",)):
         return Unit("1")
+    key = f"column {column.head!r}"
+    check_unit(said, f"unit of {key}", log.file)
     own = unit(said) if said else None
     expected = " or ".join(about.units) or "SI"
-    key = f"column {column.head!r}"
     if not said:
         raise InputError(
             f"no unit: expected one for {name}, as {expected}, in the head or in --map",

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...errors import InputError
-from ..quantities import EPOCH_S, LATEST_S, fault, unit
+from ..quantities import EPOCH_S, LATEST_S, fault, slow, unit
 from .log import Clock, Column, Log
 
 FASTEST_S = 2e-5  # most loggers of robots are slower
@@ -59,8 +59,14 @@ def from_rate(rate: float, length: int) -> Timebase:
     return Timebase(t, 0.0, said, first=Clock(t, 0.0, said))
 
 
-def from_column(log: Log, column: Column, said: str, scale: tuple[float, float]) -> Timebase:
+def from_column(log: Log, column: Column, asked: str, scale: tuple[float, float]) -> Timebase:
     """Times of a column; long numbers and dates from the first one on.
+
+    Args:
+        log: the file.
+        column: its clock.
+        asked: the unit that a map gives it, or "".
+        scale: factor and offset of its numbers.
 
     Raises:
         InputError: the column is no clock; the row is named.
@@ -70,6 +76,7 @@ def from_column(log: Log, column: Column, said: str, scale: tuple[float, float])
     if len(column.values) < 2:
         raise InputError("expected two rows or more", file=log.file)
     notes = []
+    said = asked or column.unit
     if column.calendar and said != "s":
         expected = "expected no other unit than s: its cells are dates or times of day"
         raise InputError(expected, key=f"unit of {column.head!r}", value=said, file=log.file)
@@ -78,15 +85,18 @@ def from_column(log: Log, column: Column, said: str, scale: tuple[float, float])
         notes.append(f"the clock {column.head!r} says no unit: {said} are taken")
     own = unit(said)
     if own is None or own.si != "s":
-        raise InputError("expected a unit of time", key=f"unit of {column.head!r}", value=said)
+        key = f"unit of {column.head!r}"
+        raise InputError("expected a unit of time", key=key, value=said, file=log.file)
     values = scale[0] * column.values + scale[1] if scale != (1.0, 0.0) else column.values
     absolute = own.to_si(values)
     t = absolute
     if column.since is not None and absolute[0] > EPOCH_S:
         t = own.to_si(scale[0] * column.since)
     measured = not log.own or log.meta.get("source") == "experiment"
-    _check(log, t, f"clock {column.head!r}", measured, float(absolute[0]))
-    notes += _rate(t, said) if measured else []
+    stated = bool(asked or column.calendar or own != unit("s"))
+    _check(log, t, f"clock {column.head!r}", measured, float(absolute[0]), stated)
+    if measured and not asked and not column.calendar:
+        notes += _rate(t, said)
     text = f"{column.head!r} in {said}"
     if column.dates:
         text = f"{column.dates!r} and {column.head!r}"
@@ -173,16 +183,18 @@ def _apart(t: np.ndarray, other: np.ndarray) -> bool:
 
 
 def _rate(t: np.ndarray, said: str) -> list[str]:
-    """A sentence on a clock that is faster than most loggers, or none."""
+    """A sentence on a clock that is faster or slower than most loggers, or none."""
     step = float(np.median(np.diff(t)))
-    if step > FASTEST_S:
+    if step > FASTEST_S and not slow(t):
         return []
     return [f"the clock has {1 / step:.4g} samples a second: is {said} its unit?"]
 
 
-def _check(log: Log, t: np.ndarray, said: str, measured: bool, first: float) -> None:
+def _check(
+    log: Log, t: np.ndarray, said: str, measured: bool, first: float, stated: bool = True
+) -> None:
     late = measured and np.isfinite(first) and first > LATEST_S
-    wrong = fault(np.append(first, t[1:]) if late else t, measured)
+    wrong = fault(np.append(first, t[1:]) if late else t, measured, stated)
     if wrong is not None:
         raise InputError(wrong.text, key=f"{log.row(wrong.row)}, {said}", file=log.file)
 

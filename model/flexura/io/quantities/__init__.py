@@ -1,8 +1,8 @@
 """What numbers of a run mean: its channels, their units, its clock."""
 
-from .channels import CHANNELS, STATIONS, Channel, channel
-from .clock import EPOCH_S, LATEST_S, fault, from_first
-from .units import Unit, converted, suffix, unit
+from .channels import CHANNELS, STATIONS, Channel, channel, meant
+from .clock import EPOCH_S, LATEST_S, fault, from_first, slow
+from .units import Unit, check_unit, converted, is_unit, suffix, unit
 
 __all__ = [
     "CHANNELS",
@@ -12,9 +12,13 @@ __all__ = [
     "Channel",
     "Unit",
     "channel",
+    "check_unit",
     "converted",
     "fault",
     "from_first",
+    "is_unit",
+    "meant",
+    "slow",
     "suffix",
     "unit",
 ]

@@ -7,6 +7,7 @@ link's hub (Pb: along the sleeve), its y axis 90 degrees counter-clockwise from 
 
 from __future__ import annotations
 
+import difflib
 import re
 from dataclasses import dataclass
 
@@ -257,6 +258,26 @@ CHANNELS = (
         "Taken out by the numerical damping of the solver since the start.",
     ),
 )
+
+
+def meant(name: str) -> str:
+    """What is said of a name that is no channel.
+
+    Args:
+        name: for example "joint/1/pos".
+
+    Returns:
+        For example "did you mean joint/1/position?"; "" for a channel of `CHANNELS`.
+    """
+    if any(known.fits(name) for known in CHANNELS):
+        return ""
+    numbers = [part for part in name.split("/") if part.isdecimal() and int(part) > 0]
+    spelt = []
+    for known in CHANNELS:
+        left, parts = iter(numbers), known.name.split("/")
+        spelt.append("/".join(next(left, "1") if p in ("i", "k") else p for p in parts))
+    near = difflib.get_close_matches(name, spelt, 1, 0.6)
+    return f"did you mean {near[0]}?" if near else "expected a channel, or sensor/NAME"
 
 
 def channel(name: str) -> Channel:

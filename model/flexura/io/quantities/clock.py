@@ -9,7 +9,7 @@ import numpy as np
 
 EPOCH_S = 1e8  # a later first time is one of a calendar, of 1973 or after
 LATEST_S = 1e10  # the year 2286: later times are in another unit
-SLOWEST_S = 0.45  # a measured robot is sampled faster; slower clocks are in milliseconds
+SLOWEST_S = 0.45  # most measured robots are sampled faster: a slower clock may be in milliseconds
 FEW = 8  # samples that tell nothing about a clock's unit
 
 
@@ -20,12 +20,13 @@ class Fault(NamedTuple):
     text: str
 
 
-def fault(t: np.ndarray, measured: bool = False) -> Fault | None:
+def fault(t: np.ndarray, measured: bool = False, stated: bool = False) -> Fault | None:
     """The first fault of a clock.
 
     Args:
         t: times (T,) [s].
         measured: whether a logger took the times, so that milliseconds may pass for seconds.
+        stated: whether their unit is beyond doubt, so that they may be slow.
 
     Returns:
         None if the times are finite and ascend, and, if measured, are likely in seconds.
@@ -37,13 +38,26 @@ def fault(t: np.ndarray, measured: bool = False) -> Fault | None:
         return Fault(k + 1, _sentence(t, k))
     if measured and len(t) and t[0] > LATEST_S:
         return Fault(1, f"the time is {t[0]:.6g} s: expected seconds, not milliseconds or less")
-    if measured and len(t) >= FEW and np.median(np.diff(t)) > SLOWEST_S:
+    if measured and not stated and slow(t):
         step = float(t[1] - t[0])
         return Fault(
             2,
-            f"the time is {step:.4g} s after row 1: is the clock in milliseconds or microseconds?",
+            f"the time is {step:.4g} s after row 1: is the clock in milliseconds or microseconds? "
+            'If it is in seconds, a map of the log says so: [time] unit = "s"',
         )
     return None
+
+
+def slow(t: np.ndarray) -> bool:
+    """Whether most measured robots are sampled faster.
+
+    Args:
+        t: times (T,) [s], ascending.
+
+    Returns:
+        True if milliseconds may pass for seconds.
+    """
+    return len(t) >= FEW and bool(np.median(np.diff(t)) > SLOWEST_S)
 
 
 def _sentence(t: np.ndarray, k: int) -> str:

@@ -12,6 +12,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...errors import InputError
+
 G = 9.80665  # m/s^2, standard gravity
 TURN = 2 * np.pi
 
@@ -60,8 +62,28 @@ _PREFIXES = {
     "M": 1e6,
     "G": 1e9,
 }
-# Symbols that take a prefix, and their SI unit.
-_PREFIXED = ("m", "s", "A", "K", "rad", "Hz", "N", "Pa", "W", "V", "ohm", "T", "C", "J")
+# Symbols that take a prefix, each with those that sensors have: "Mm" and "Grad" are something else.
+_PREFIXED = {
+    "m": "pnumcdk",
+    "s": "pnumcd",
+    "A": "pnumk",
+    "K": "numcd",
+    "rad": "num",
+    "Hz": "umkMG",
+    "N": "numcdkM",
+    "Pa": "numkMG",
+    "W": "pnumkMG",
+    "V": "pnumk",
+    "ohm": "umkMG",
+    "T": "pnum",
+    "C": "pnum",
+    "J": "numkMG",
+}
+# Units that are read in two ways, in lower case, and these ways.
+_AMBIGUOUS = {
+    **dict.fromkeys(("grad", "grads", "grade", "grades"), ("deg", "gon")),
+    **{f"ms{power}": ("m/s", "1/ms") for power in ("-1", "^-1", "**-1", "^(-1", "**(-1")},
+}
 # Other symbols: a number of an SI unit.
 _OTHERS: dict[str, tuple[float, str]] = {
     "1": (1.0, "1"),
@@ -80,7 +102,8 @@ _OTHERS: dict[str, tuple[float, str]] = {
     **dict.fromkeys(("gon",), (np.pi / 200, "rad")),
     **dict.fromkeys(("rev", "revs", "turn", "turns", "revolution"), (TURN, "rad")),
     **dict.fromkeys(("revolutions", "U", "cycles", "tr"), (TURN, "rad")),
-    **dict.fromkeys(("rpm", "RPM", "1/min", "U/min"), (TURN / 60, "rad/s")),
+    **dict.fromkeys(("rpm", "RPM", "1/min", "U/min", "r/min"), (TURN / 60, "rad/s")),
+    **dict.fromkeys(("min-1", "min^-1", "min**-1"), (TURN / 60, "rad/s")),
     **dict.fromkeys(("radian", "radians"), (1.0, "rad")),
     "mdeg": (1e-3 * np.pi / 180, "rad"),
     "dps": (np.pi / 180, "rad/s"),
@@ -166,10 +189,9 @@ def unit(text: str) -> Unit | None:
         text: for example "mm", "[deg/s]", "m/s²", "degC", "%".
 
     Returns:
-        None for a text that is no unit.
+        None for a text that is no unit, or an ambiguous one.
     """
-    plain = text.strip().strip("[]()").strip().translate(_SUPERSCRIPTS)
-    plain = plain.replace("µ", "u").replace("μ", "u").replace("′", "'")
+    plain = _plain(text)
     if plain in _CELSIUS:
         return Unit("K", 1.0, 273.15)
     if plain in _FAHRENHEIT:
@@ -178,6 +200,52 @@ def unit(text: str) -> Unit | None:
         factor, name = _OTHERS.get(plain, (1.0, plain))
         return Unit(name, factor)
     return _product(plain)
+
+
+def readings(text: str) -> tuple[str, ...]:
+    """The units that an ambiguous one may be.
+
+    Args:
+        text: as a logger writes it.
+
+    Returns:
+        For example "deg" and "gon" of "Grad"; none of any other text.
+    """
+    return _AMBIGUOUS.get(_plain(text).lower(), ())
+
+
+def check_unit(text: str, key: str, file: str = "") -> None:
+    """Refuse an ambiguous unit.
+
+    Args:
+        text: as a logger writes it.
+        key: whose unit it is, for the message.
+        file: where it stands.
+
+    Raises:
+        InputError: by what it may be.
+    """
+    if may := readings(text):
+        expected = f"it may be {' or '.join(may)}: expected one of these"
+        raise InputError(expected, key=key, value=text, file=file)
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit, perhaps an ambiguous one.
+
+    Args:
+        text: as a logger writes it.
+
+    Returns:
+        True if it is.
+    """
+    return unit(text) is not None or bool(readings(text))
+
+
+def _plain(text: str) -> str:
+    """A unit without brackets and with the letters of ASCII."""
+    plain = text.strip().strip("[]()").strip().translate(_SUPERSCRIPTS)
+    return plain.replace("µ", "u").replace("μ", "u").replace("′", "'")
 
 
 def _product(text: str) -> Unit | None:
@@ -214,7 +282,9 @@ def _symbol(token: str) -> tuple[float, Dimension, int] | None:
         return factor, _DIMENSIONS[base], power
     if name in _PREFIXED:
         return 1.0, _DIMENSIONS[name], power
-    if name[:1] in _PREFIXES and name[1:] in _PREFIXED:
+    if name == "ms" and power != 1:  # "ms-2" is m/s^2 in the field; no sensor has another power
+        return (1.0, _DIMENSIONS["m/s^2"], 1) if power == -2 else None
+    if name[:1] and name[:1] in _PREFIXED.get(name[1:], ""):
         return _PREFIXES[name[0]], _DIMENSIONS[name[1:]], power
     return None
 

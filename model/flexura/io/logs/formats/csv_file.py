@@ -18,6 +18,7 @@ from .heads import (
     is_units,
     like_rows,
     named,
+    without_preamble,
     without_titles,
 )
 from .text import decoded, number, numbers, numeric, refused
@@ -41,7 +42,9 @@ def read(raw: bytes, file: str) -> Log:
         InputError: it is no table of numbers, or a row has too many or too few cells.
     """
     text, encoding = decoded(raw, file)
-    every = [Line(k, line) for k, line in enumerate(text.splitlines(), 1) if line.strip()]
+    numbered = [Line(k, line) for k, line in enumerate(text.splitlines(), 1)]
+    every = [line for line in numbered if line.text.strip()]
+    empty = {line.number for line in numbered if not line.text.strip()}
     comments = [line for line in every if line.text.lstrip().startswith(COMMENT)]
     lines = [line for line in every if not line.text.lstrip().startswith(COMMENT)]
     if not lines:
@@ -68,7 +71,9 @@ def read(raw: bytes, file: str) -> Log:
             key=f"line {lines[first - 1].number}",
             file=file,
         )
-    heads = without_titles([cells for cells in above if len(cells) == width])[-3:]
+    after = [line.number - 1 in empty for line in lines[:first]]
+    wide = [pair for pair in zip(above, after, strict=True) if len(pair[0]) == width]
+    heads = without_titles(without_preamble(wide, comma))[-3:]
     own = _own(comments)
     named_columns = named(
         heads or from_comments(comments, separator, width), width, own.get("units", {})

@@ -8,9 +8,9 @@ import re
 from dataclasses import dataclass
 
 from ....errors import InputError
-from ...quantities import suffix, unit
+from ...quantities import is_unit, suffix
 from ..names import parted
-from .text import gap, numeric, refused
+from .text import gap, number, numeric, refused
 
 MARKS = "#%/\"' "  # what a comment begins with
 
@@ -46,6 +46,27 @@ def without_titles(heads: list[list[str]]) -> list[list[str]]:
     return others if any(len(row) > 1 for row in others) else heads
 
 
+def without_preamble(heads: list[tuple[list[str], bool]], comma: bool) -> list[list[str]]:
+    """Rows of heads without what a program says above them in as many cells.
+
+    That ends with an empty line, with a row that has a number, or before a row of heads with units.
+
+    Args:
+        heads: the rows, each with whether an empty line stands before it.
+        comma: whether the decimal sign is a comma.
+    """
+    begin = 0
+    for k, (row, after_break) in enumerate(heads):
+        if is_units(row):
+            continue
+        own_units = sum(parted(cell)[1] != "" for cell in row)
+        if after_break or 2 * own_units > len(row):
+            begin = k
+        elif k + 1 < len(heads) and any(number(cell, comma) is not None for cell in row):
+            begin = k + 1
+    return [row for row, _ in heads[begin:]]
+
+
 def from_comments(comments: list[Line], separator: str, width: int) -> list[list[str]]:
     """Heads that stand in the last comment above the numbers, as `#time,accel_x`."""
     for line in reversed(comments):
@@ -76,9 +97,7 @@ def is_units(row: list[str]) -> bool:
     """Whether a row of heads has units: each cell is one, or empty."""
     said = [cell for cell in row if not gap(cell)]
     bracketed = [cell for cell in said if cell[:1] in "[(" and cell[-1:] in "])"]
-    return bool(said) and (
-        len(bracketed) == len(said) or all(unit(cell) is not None for cell in said)
-    )
+    return bool(said) and (len(bracketed) == len(said) or all(map(is_unit, said)))
 
 
 def check_damage(above: list[Line], first: Line, separator: str, comma: bool, file: str) -> None:
