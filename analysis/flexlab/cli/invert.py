@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,14 +10,24 @@ import typer
 
 import flexura as fx
 from flexura.io import FILE, write_toml
+from flexura.io.logs import TIMES, Column, Map, Source, in_time, read_log, understood
+from flexura.io.quantities import slow
 
 from ..studies.drive_requirements import efforts
 from . import tables
 from .options import Force, Json, Out, RobotFile
-from .output import message, print_results, progress_bars, report_saved
+from .output import message, print_results, progress_bars, report_saved, warn
 from .results import results
 
 MANOEUVRE = "manoeuvre.toml"
+# Columns of a table: the channel whose units they have, and the unit of one that says none.
+CHANNELS = {
+    "t": ("", "s"),
+    "x": ("tip/x", "m"),
+    "y": ("tip/y", "m"),
+    "angle": ("link/1/angle", "rad"),
+    "place": ("tip/x", "m"),
+}
 
 
 def _numbers(param: typer.CallbackParam, value: Any) -> Any:
@@ -65,7 +74,11 @@ def invert(
     ] = None,
     table: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="CSV file with the columns t, x, y or t, angle"),
+        typer.Option(
+            metavar="FILE",
+            help="a log with the columns t, x, y or t, angle or t, place (of a rail); heads may "
+            "have units, as x [mm]",
+        ),
     ] = None,
     duration: Annotated[float, typer.Option(metavar="SECONDS", help="of the path")] = 1.0,
     step: Annotated[float, typer.Option(metavar="SECONDS", help="between rows, at most")] = 1e-3,
@@ -103,7 +116,7 @@ def invert(
     t = np.linspace(0.0, duration, max(round(duration / step), 1) + 1)
     tip: Any
     if table is not None:
-        t, tip = _columns(table)
+        t, tip = table_of(table, described)
     elif ends is not None:
         tip = fx.signals.paths.line(ends[:2], ends[2:], duration)
     elif ring is not None:
@@ -184,24 +197,48 @@ def _place(text: str) -> list[float]:
     return [x, y]
 
 
-def _columns(path: Path) -> tuple[np.ndarray, Any]:
-    """Times, and the path as `fx.invert` takes it, of a CSV file."""
-    expected = "expected a CSV file of numbers with 2 or 3 columns, t and angle or t, x and y"
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of an empty file
-            rows = np.genfromtxt(path, delimiter=",", comments="#", ndmin=2)
-    except (OSError, ValueError) as error:
-        raise fx.InputError(f"{expected} ({error})", file=str(path)) from None
-    if len(rows) and np.isnan(rows[0]).all():  # the names of the columns
-        rows = rows[1:]
-    if rows.ndim != 2 or rows.shape[1] not in (2, 3) or len(rows) < 2:
-        raise fx.InputError(expected, file=str(path))
-    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if len(bad):
-        raise fx.InputError(f"{expected}; row {bad[0] + 1} has something else", file=str(path))
-    back = np.flatnonzero(np.diff(rows[:, 0]) <= 0)
-    if len(back):
-        text = f"expected ascending times in seconds; row {back[0] + 2} is not later"
-        raise fx.InputError(text, file=str(path), key="t", value=float(rows[back[0] + 1, 0]))
-    return rows[:, 0], rows[:, 1] if rows.shape[1] == 2 else (rows[:, 1], rows[:, 2])
+def table_of(path: Path, robot: fx.Robot) -> tuple[np.ndarray, Any]:
+    """Times, and the path as `fx.invert` takes it, of a table: a log with the path's columns."""
+    log = read_log(path)
+    moving = next((link.joint for link in robot.links if not link.joint.locked), None)
+    one = "angle" if moving is None or moving.type == "R" else "place"
+    wanted = ("t", "x", "y") if len(log.columns) == 3 else ("t", one)
+    heads = ", ".join(repr(column.head) for column in log.columns[:8])
+    if len(log.columns) != len(wanted):
+        raise fx.InputError(
+            f"expected the columns t, x, y or t, {one}; there are {len(log.columns)}: {heads}",
+            file=str(path),
+        )
+    named = [_of_path(column) for column in log.columns]
+    unnamed = not any(column.name for column in log.columns)
+    found = {name: k for k, name in enumerate(wanted if unnamed else named, 1)}
+    if set(found) != set(wanted):
+        raise fx.InputError(
+            f"expected the heads {', '.join(wanted)}, or these with units, not {heads}",
+            file=str(path),
+        )
+    sources = {
+        name: Source(k, log.columns[k - 1].unit or CHANNELS[name][1]) for name, k in found.items()
+    }
+    channels = {CHANNELS[name][0]: sources[name] for name in wanted[1:]}
+    read = understood(log, Map(str(path), sources["t"], None, channels))
+    notes = list(read.notes)
+    if not log.columns[found["t"] - 1].unit and slow(read.run.t):
+        notes.append(f"its rows are {np.diff(read.run.t)[0]:g} s apart: t without a unit is in s")
+    for note in notes:
+        warn(f"{path}: {note}")
+    tip = [read.run[name] for name in channels]
+    gaps = np.flatnonzero(~np.isfinite(tip).all(axis=0))
+    if len(gaps):
+        raise fx.InputError(
+            "a cell without a number: expected a whole path",
+            key=log.row(int(gaps[0]) + 1),
+            file=str(path),
+        )
+    return read.run.t, tip[0] if len(tip) == 1 else tuple(tip)
+
+
+def _of_path(column: Column) -> str:
+    """What a column of a table is: "t", "x", "y", "angle", "place", or its own name."""
+    name = column.name.lower().removeprefix("tip").lstrip("/_ ")
+    return "t" if in_time(column.unit) or column.calendar or name in TIMES else name

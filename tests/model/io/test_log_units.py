@@ -94,7 +94,7 @@ def test_a_slow_clock_is_read_where_its_unit_is_stated(head, asked, step, tmp_pa
 def test_a_slow_clock_of_seconds_needs_a_map(head, tmp_path):
     """Milliseconds often stand under a head of seconds."""
     read = log(tmp_path, f"{head},joint/1/position [rad]", 1.5)
-    with pytest.raises(fx.InputError, match='row 2 .*milliseconds .* map .*unit = "s"'):
+    with pytest.raises(fx.InputError, match=r'row 2 .*milliseconds .* map .*unit = "s"'):
         understood(read)
 
 

@@ -3,10 +3,13 @@
 from .damage import digest
 from .log import Clock, Column, Log
 from .mapping import Map, Source, read_map
+from .names import TIMES
 from .read import read_log
 from .selection import Taken, Understood, understood
+from .timebase import in_time
 
 __all__ = [
+    "TIMES",
     "Clock",
     "Column",
     "Log",
@@ -15,6 +18,7 @@ __all__ = [
     "Taken",
     "Understood",
     "digest",
+    "in_time",
     "read_log",
     "read_map",
     "understood",
