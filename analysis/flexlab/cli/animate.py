@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..runs.of_robot import check_own
 from .options import ForceFile, Json
 from .output import message, print_results, progress_bars
 from .results import file_result
@@ -37,6 +38,7 @@ def animate(
     """
     target = out or (run if run.is_dir() else run.parent) / "run.gif"
     shown = one_run(run, robot)
+    check_own(shown, str(run))
     with file_result(target, force=force) as draft, progress_bars("pictures") as report:
         shown.animate(
             draft,

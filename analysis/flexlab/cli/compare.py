@@ -24,6 +24,7 @@ from ..review import write_review
 from ..runs.alignment import best_shift, shifted
 from ..runs.deviation import common
 from ..runs.formatting import finite
+from ..runs.of_robot import check_channels, check_own
 from .options import Force, Json, Rtol
 from .output import events, message, print_results, progress_bars
 from .results import counted, file_result, results
@@ -107,6 +108,8 @@ def compare(
                         value=str(value),
                     )
             second = fx.Run.read(other)
+            check_own(first, str(run))
+            check_own(second, str(other))
             if align:
                 found_shift = best_shift(first, second, channels)
                 moved = (found_shift.seconds, found_shift.correlation)
@@ -117,6 +120,10 @@ def compare(
             first, second = simulation_first(first, second)
         else:
             described = None if robot is None else fx.load(robot)
+            if described is None:
+                check_own(first, str(run))
+            else:
+                check_channels(first, described, str(run))
             with progress_bars("native") as report:
                 try:
                     second, by = first, by or "commanded"

@@ -12,6 +12,7 @@ import flexura as fx
 from ..comparison import table as compared
 from ..identification import files, output
 from ..identification.identify_rig import identify as identified
+from ..runs.of_robot import check_own
 from .identify_robot import asked_of, identify_asked
 from .options import ForceFile, Json
 from .output import message, print_results, progress_bars, warn
@@ -126,6 +127,7 @@ def identify(
             raise fx.InputError("expected together with --fit", key=key, value=str(given))
     run = paths[0]
     experiment = fx.Run.read(run)
+    check_own(experiment, str(run))
     if by is not None and check is None:
         raise fx.InputError("expected together with --check", key="--by", value=by)
     other = None if check is None else fx.Run.read(check)

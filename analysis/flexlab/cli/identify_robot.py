@@ -17,6 +17,7 @@ from flexura.io import find, write_text
 from ..identification import Identification, identify_robot
 from ..identification.fit import report
 from ..identification.fit.unknowns import assigned, of_channel
+from ..runs.of_robot import check_channels
 from .output import message, print_results, progress_bars, warn
 from .results import counted, file_result
 
@@ -104,6 +105,9 @@ def identify_asked(
             raise fx.InputError("expected KEY=VALUE", key="--fix", value=text)
         fixed[key] = value
     other = None if check is None else fx.Run.read(check)
+    for path, run in zip([*asked.runs, check], [*runs, other], strict=True):
+        if run is not None:
+            check_channels(run, robot, str(path))
     first = asked.runs[0]
     home = first if first.is_dir() else first.parent
     with (

@@ -10,10 +10,11 @@ import typer
 
 import flexura as fx
 from flexura.errors import InputError
-from flexura.io import FILE
-from flexura.io.logs import Understood, read_log, read_map, understood
+from flexura.io import FILE, Tables
+from flexura.io.logs import Map, Understood, read_log, read_map, understood
 
 from ..runs.formatting import number
+from ..runs.of_robot import check_own
 from ..runs.table import Table
 from .import_robot import import_robot
 from .options import Force, Json
@@ -88,11 +89,11 @@ def import_(
     asked = None if map_ is None else read_map(map_)
     tables = None if robot is None else fx.load(robot).to_dict()
     if look:
-        found = understood(read_log(file), asked, robot=tables, every=every)
+        found = _read(file, asked, tables, every)
         print_results(json, lambda: table(found, file), lambda: data(found))
         return
     with results(out, "import", file.stem, force=force) as draft:
-        found = understood(read_log(file), asked, robot=tables, every=every)
+        found = _read(file, asked, tables, every)
         if not json:
             print_results(False, lambda: table(found, file), dict)
         found.run.save(draft.folder)
@@ -100,6 +101,14 @@ def import_(
     if json:
         print_results(True, lambda: None, lambda: data(found) | {"run": str(folder / FILE)})
     message(json, f"stored {folder / FILE}", f"look at it: flexura review {folder}")
+
+
+def _read(file: Path, asked: Map | None, robot: Tables | None, every: bool) -> Understood:
+    """What is understood of a log, if it can be one of the robot."""
+    found = understood(read_log(file), asked, robot=robot, every=every)
+    if robot is not None:
+        check_own(found.run, str(file))
+    return found
 
 
 def table(found: Understood, file: Path) -> Table:

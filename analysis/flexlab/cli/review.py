@@ -12,6 +12,7 @@ from flexura.population import is_population
 
 from .. import review as rerun
 from ..runs.deviation import common
+from ..runs.of_robot import check_own
 from .options import ForceFile, Json
 from .output import message, print_results, warn
 from .results import counted, file_result
@@ -62,6 +63,8 @@ def review(
                 rerun.picture(target, draft, time_s=time_s)
     else:
         read = [one_run(folder, robot if is_population(folder) else None) for folder in runs]
+        for path, one in zip(runs, read, strict=True):
+            check_own(one, str(path))
         for path, other in zip(runs[1:], read[1:], strict=True):
             if not common(read[0], other).any():
                 warn(f"{path} has no time in common with {runs[0]}: there is no deviation")

@@ -21,6 +21,7 @@ import numpy as np
 import flexura as fx
 from flexura.errors import InputError
 from flexura.io import called, kind
+from flexura.io.quantities import listed
 
 from ..runs.deviation import deviation, deviations, interpolate, shared
 
@@ -173,7 +174,7 @@ def _usual(first: fx.Run, second: fx.Run) -> list[str]:
     if not names:
         raise InputError(
             f"expected two runs with a channel in common, in one unit; the first has: "
-            f"{', '.join(first) or 'none'}; the second: {', '.join(second) or 'none'}",
+            f"{listed(first)}; the second: {listed(second)}",
             key="RUN",
         )
     return names

@@ -16,6 +16,7 @@ import numpy as np
 
 from flexura.errors import InputError
 from flexura.io import Run
+from flexura.io.quantities import listed
 
 TIP_DISTANCE = "tip_distance"  # the distance between the two tips [m]; not a channel of a Run
 SLACK = 1e-9  # s: time stamps that differ by less are the same time
@@ -54,13 +55,14 @@ def deviation(first: Run, second: Run, channel: str) -> tuple[np.ndarray, np.nda
     for run, which in ((first, "first"), (second, "second")):
         if channel not in run:
             raise InputError(
-                f"a channel of both runs; the {which} has: {', '.join(run)}",
+                f"expected a channel of both runs; the {which} has: {listed(run)}",
                 key="channel",
                 value=channel,
             )
     if first.units[channel] != second.units[channel]:
         raise InputError(
-            f"the same unit in both runs, not {first.units[channel]} and {second.units[channel]}",
+            f"expected the same unit in both runs, not {first.units[channel]} and "
+            f"{second.units[channel]}",
             key=channel,
         )
     inside = common(first, second)

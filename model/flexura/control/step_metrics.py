@@ -37,6 +37,7 @@ import numpy as np
 from .. import core
 from ..errors import InputError
 from ..io import Run, number
+from ..io.quantities import listed
 
 RISE, SETTLING, OVERSHOOT, ERROR, ITAE, EFFORT = range(6)  # columns of a joint's figures
 PEAK, RESIDUAL, VIBRATION, RMS = range(4)  # of the strip's
@@ -160,7 +161,7 @@ def step_figures(
     """
     if channel not in run:
         raise InputError(
-            f"expected a channel of the run: {', '.join(run)}", key="channel", value=channel
+            f"expected a channel of the run: {listed(run)}", key="channel", value=channel
         )
     for key, value in (("target", target), ("start", start)):
         if value is not None:

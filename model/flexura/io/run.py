@@ -22,7 +22,7 @@ from .drawing.over_time import figure, heading
 from .drawing.pictures import FORMS, saved
 from .files import path_of, refuse_taken, write_bytes
 from .frames import pandas_frame, xarray_dataset
-from .quantities import check_unit, converted, fault, from_first, suffix, unit
+from .quantities import check_unit, converted, fault, from_first, listed, suffix, unit
 from .run_file import FILE
 from .toml_files import Tables
 
@@ -119,9 +119,7 @@ class Run:
         try:
             return self.channels[channel]
         except KeyError:
-            raise KeyError(
-                f"no channel {channel!r}; there are: {', '.join(self.channels)}"
-            ) from None
+            raise KeyError(f"no channel {channel!r}; there are: {listed(self.channels)}") from None
 
     def __contains__(self, channel: object) -> bool:
         return channel in self.channels

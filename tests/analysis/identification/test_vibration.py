@@ -201,7 +201,12 @@ def test_what_does_not_ring_ends_in_a_sentence(tmp_path):
     for words, said in (
         ([run], "no vibration stands out of the noise"),
         ([run, "--channel", "sensor/b"], "expected a channel of the run: sensor/a"),
-        ([run, "--from-s", "4.9"], "10 samples: expected 32"),
+        (
+            [run, "--from-s", "4.9"],
+            "10 samples from 4.9 s on, of a run from 0 to 4.99 s: expected 32",
+        ),
+        ([run, "--from-s", "6"], "0 samples from 6 s on, of a run from 0 to 4.99 s"),
+        ([run, "--to-s", "0.1"], "11 samples from the start until 0.1 s, of a run from 0 to 4.99"),
         ([still], "a channel that moves"),
     ):
         status, out, err = command(["vibration", *words])

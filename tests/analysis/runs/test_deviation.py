@@ -23,6 +23,18 @@ def test_a_run_does_not_deviate_from_itself():
     assert [row.max for row in deviations(one, one)] == [0.0, 0.0, 0.0, 0.0]
 
 
+def test_the_channels_of_a_run_are_said_in_short():
+    t = np.linspace(0, 1, 3)
+    along = {f"link__1__deflection__{k}": t for k in range(9)}
+    one, other = run(t, tip__x=t, **along), run(t, tip__y=t)
+    said = r"has: tip/x, link/1/deflection/0 to 8$"
+    with pytest.raises(InputError, match=f"expected a channel of both runs; the second {said}"):
+        deviation(other, one, "tip/y")
+    many = run(t, **{f"joint__{k}__position": t for k in range(1, 31)})
+    with pytest.raises(InputError, match=r"joint/20/position and 10 more$"):
+        deviation(other, many, "tip/y")
+
+
 def test_second_minus_first_on_the_times_of_the_first():
     """A straight line is interpolated exactly, whatever the grid."""
     t, s = np.linspace(0, 2, 21), np.sort(np.random.default_rng(1).uniform(-0.1, 2.1, 57))

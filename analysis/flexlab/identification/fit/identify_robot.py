@@ -19,7 +19,9 @@ import numpy as np
 
 import flexura as fx
 from flexura.control import Gains, load_gains
+from flexura.io.quantities import listed
 
+from ...runs.of_robot import check_channels
 from ..estimate import Estimate
 from . import findings
 from .inputs import MOTION, REFERENCE, choose
@@ -189,6 +191,7 @@ def _experiment(
                 key=key,
                 value=len(run.meta[key]),
             )
+    check_channels(run, robot)
     chosen = choose(run, robot, inputs, gains)
     simulated = _channels(robot)
     compared = tuple(channels) or default_channels(run, simulated, chosen)
@@ -196,7 +199,7 @@ def _experiment(
         for where, has in (("the run", list(run)), ("a simulation", simulated)):
             if name not in has:
                 raise fx.InputError(
-                    f"{where} has no such channel; it has {', '.join(has)}",
+                    f"{where} has no such channel; it has {listed(has)}",
                     key="--channel",
                     value=name,
                 )
@@ -205,7 +208,7 @@ def _experiment(
     if not compared:
         raise fx.InputError(
             "nothing to compare: expected a sensor, a tip deflection, a position or the tip's "
-            f"place; the run has {', '.join(run)}",
+            f"place; the run has {listed(run)}",
             key="RUN",
         )
     starts = frozenset(key for key in [*asked, *fixed] if ".start_" in key)
@@ -225,10 +228,15 @@ def _channels(robot: fx.Robot) -> list[str]:
 
 
 def _span(run: fx.Run, low: float | None, high: float | None) -> tuple[float, float]:
-    return (
-        float(run.t[0]) if low is None else low,
-        float(run.t[-1]) if high is None else high,
-    )
+    begin, end = float(run.t[0]), float(run.t[-1])
+    first, last = begin if low is None else low, end if high is None else high
+    if not (first < last and first < end and last > begin):
+        raise fx.InputError(
+            f"expected a part of the run, from {begin:.4g} to {end:.4g} s",
+            key="from_s, to_s",
+            value=f"{first:g} to {last:g} s",
+        )
+    return first, last
 
 
 def _unknowns(

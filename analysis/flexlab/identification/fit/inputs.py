@@ -16,6 +16,7 @@ import numpy as np
 import flexura as fx
 from flexura import signals
 from flexura.control import Gains
+from flexura.io.quantities import listed
 from flexura.signals import COLUMNS, Signal
 
 from ...comparison.replay.smoothing import (
@@ -76,7 +77,7 @@ def choose(
         if not channel:
             raise fx.InputError(
                 f"nothing moves joint {i}: expected a channel joint/{i}/{names[0]}, or --input; "
-                f"the run has {', '.join(run)}",
+                f"the run has {listed(run)}",
                 key="RUN",
             )
         found[i] = Input(i, channel, _kind(robot, i, channel, controller))
@@ -119,7 +120,7 @@ def _kind(robot: fx.Robot, joint: int, channel: str, controller: Gains | None) -
 
 def _missing(run: fx.Run, channel: str, key: str) -> fx.InputError:
     return fx.InputError(
-        f"the run has no such channel; it has {', '.join(run)}", key=key, value=channel
+        f"the run has no such channel; it has {listed(run)}", key=key, value=channel
     )
 
 

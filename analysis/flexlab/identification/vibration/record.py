@@ -9,6 +9,7 @@ import numpy as np
 
 import flexura as fx
 from flexura.errors import InputError
+from flexura.io.quantities import listed
 
 FEWEST = 32  # samples of a free vibration
 # The first of these that a run has: the channel that rings, in the order of what tells most.
@@ -58,7 +59,7 @@ def record(
     name = _chosen(run) if channel is None else channel
     if name not in run:
         raise InputError(
-            f"expected a channel of the run: {', '.join(run)}", key="--channel", value=name
+            f"expected a channel of the run: {listed(run)}", key="--channel", value=name
         )
     there = np.isfinite(run[name])
     if end is not None:
@@ -77,8 +78,10 @@ def record(
             why = f"from the largest swing at {t[first]:.4g} s on"
         t, y = t[first:], y[first:]
     if len(y) < FEWEST:
+        until = "" if end is None else f" until {end:g} s"
         raise InputError(
-            f"{len(y)} samples: expected {FEWEST} of a free vibration or more",
+            f"{len(y)} samples {why}{until}, of a run from {run.t[0]:.4g} to {run.t[-1]:.4g} s: "
+            f"expected {FEWEST} of a free vibration or more",
             key=f"channel {name}",
         )
     if np.ptp(y) == 0:
@@ -97,7 +100,7 @@ def _chosen(run: fx.Run) -> str:
         moving = {name: swing for name, swing in swings.items() if swing > 0}
         if moving:
             return max(moving, key=lambda name: moving[name])
-    raise InputError("expected a run with a channel that moves", key="RUN", value=list(run))
+    raise InputError("expected a run with a channel that moves", key="RUN", value=listed(run))
 
 
 def _swing(values: np.ndarray) -> float:

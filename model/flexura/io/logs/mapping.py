@@ -82,8 +82,8 @@ def _map(tables: dict[str, Any], name: str) -> Map:
         key = f'channel."{channel}"'
         if not is_name(channel) or not isinstance(table, dict):
             raise InputError("expected a table with column and unit", key=key, value=table)
-        if said := meant(channel):
-            raise InputError(f"an unknown channel; {said}", key=key)
+        if wrong := meant(channel):
+            raise InputError(f"an unknown channel; {wrong}", key=key)
         _known(table, _CHANNEL, key)
         channels[channel] = _source(table, key)
     if not channels:

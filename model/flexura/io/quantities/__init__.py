@@ -1,6 +1,6 @@
 """What numbers of a run mean: its channels, their units, its clock."""
 
-from .channels import CHANNELS, STATIONS, Channel, channel, meant
+from .channels import CHANNELS, STATIONS, Channel, channel, listed, meant
 from .clock import EPOCH_S, LATEST_S, fault, from_first, slow
 from .units import Unit, check_unit, converted, is_unit, suffix, unit
 
@@ -17,6 +17,7 @@ __all__ = [
     "fault",
     "from_first",
     "is_unit",
+    "listed",
     "meant",
     "slow",
     "suffix",

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+MOST = 20  # entries of a list in a message
 STATIONS = 9  # places along a flexible link at which a Run holds the deflection
 
 
@@ -278,6 +280,28 @@ def meant(name: str) -> str:
         spelt.append("/".join(next(left, "1") if p in ("i", "k") else p for p in parts))
     near = difflib.get_close_matches(name, spelt, 1, 0.6)
     return f"did you mean {near[0]}?" if near else "expected a channel, or sensor/NAME"
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names of channels in a sentence, those along a link as one.
+
+    Args:
+        names: of a run.
+
+    Returns:
+        For example "tip/x, link/1/deflection/0 to 8", with at most 20 entries; "none" of none.
+    """
+    places: dict[str, list[int]] = {}
+    for name in names:
+        before, _, last = name.rpartition("/")
+        key = before if last.isdecimal() else name
+        places.setdefault(key, []).extend([int(last)] if last.isdecimal() else [])
+    said = [
+        f"{key}/{min(at)} to {max(at)}" if at[1:] else f"{key}/{at[0]}" if at else key
+        for key, at in places.items()
+    ]
+    more = f" and {len(said) - MOST} more" if len(said) > MOST else ""
+    return ", ".join(said[:MOST]) + more if said else "none"
 
 
 def channel(name: str) -> Channel:
