@@ -97,7 +97,7 @@ def compare(
     target = counted(home / "comparison", folder=True) if out is None else out
     with (
         results(target, force=force) as draft,
-        file_result(picture, "--picture", force=force) as shot,
+        file_result(picture, "--picture", force=force, suffix=".png") as shot,
     ):
         if other is not None:
             for key, value in (("by", by), ("robot", robot)):

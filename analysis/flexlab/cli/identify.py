@@ -134,7 +134,7 @@ def identify(
     home = run if run.is_dir() else run.parent
     path = out or counted(home / "identified", folder=True) / "robot.toml"
     with (
-        file_result(path, force=force or out is None),
+        file_result(path, force=force or out is None, suffix=".toml"),
         file_result(files.beside(path), force=force or out is None),
     ):
         try:

@@ -111,7 +111,7 @@ def identify_asked(
     first = asked.runs[0]
     home = first if first.is_dir() else first.parent
     with (
-        file_result(out, force=force),
+        file_result(out, force=force, suffix=".toml"),
         file_result(None if out is None else _beside(out), force=force),
     ):
         with progress_bars("fit") as told:

@@ -34,7 +34,7 @@ def import_robot(
         json: print JSON.
     """
     target = out or file.with_suffix(".toml")
-    with file_result(None if look else target, force=force) as draft:
+    with file_result(None if look else target, force=force, suffix=".toml") as draft:
         found = read_urdf(file, sections)
         if not look:
             fx.save(found.robot, draft, overwrite=True)

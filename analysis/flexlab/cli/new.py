@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-import flexura as fx
 from flexura.io import write_text
 
 from .options import ForceFile, Json
@@ -30,10 +29,8 @@ def new(
     \b
     Example: flexura new my-arm.toml
     """
-    if file.suffix != ".toml":
-        raise fx.InputError("expected a name that ends with .toml", key="FILE", value=str(file))
     named = f"name = {json_.dumps(file.stem[:200], ensure_ascii=False)}"
-    with file_result(file, "FILE", force=force) as draft:
+    with file_result(file, "FILE", force=force, suffix=".toml") as draft:
         write_text(draft, TEMPLATE.read_text("utf-8").replace('name = "my robot"', named, 1))
     if json:
         print_results(True, lambda: None, lambda: {"robot": str(file)})

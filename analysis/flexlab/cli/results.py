@@ -18,6 +18,7 @@ from pathlib import Path
 from flexura.errors import InputError
 from flexura.io import (
     DRAFT,
+    check_suffix,
     draft_of,
     linked,
     make_folder,
@@ -173,7 +174,9 @@ def continued(out: Path | None, *names: str, mark: str) -> Path:
 
 
 @contextmanager
-def file_result(path: Path | None, key: str = "--out", *, force: bool = False) -> Iterator[Path]:
+def file_result(
+    path: Path | None, key: str = "--out", *, force: bool = False, suffix: str = ""
+) -> Iterator[Path]:
     """Try a file before the work: it is not there, and can be written.
 
     Folders that were made for it are removed if it is not there at the end.
@@ -182,12 +185,14 @@ def file_result(path: Path | None, key: str = "--out", *, force: bool = False) -
         A draft: what is written there gets the file's name in the end. Without a path, none.
 
     Raises:
-        InputError: the file is there and `force` is false, or it cannot be written. If another
-            command wrote it meanwhile, the new one stands beside.
+        InputError: the file is there and `force` is false, it has another suffix, or it cannot be
+            written. If another command wrote it meanwhile, the new one stands beside.
     """
     if path is None:
         yield Path()
         return
+    if suffix:
+        check_suffix(path, suffix, key)
     if os.path.isdir(path):
         raise InputError("a folder: expected the name of a file", key=key, value=str(path))
     if os.path.lexists(path) and not force:

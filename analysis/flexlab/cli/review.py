@@ -58,7 +58,7 @@ def review(
     drawn = None if picture is None else str(picture)
     if runs[0].suffix == ".rrd" and len(runs) == 1 and save is None:
         target = runs[0]
-        with file_result(picture, "--picture", force=force) as draft:
+        with file_result(picture, "--picture", force=force, suffix=".png") as draft:
             if picture is not None:
                 rerun.picture(target, draft, time_s=time_s)
     else:
@@ -73,8 +73,10 @@ def review(
         if target == beside and target.exists() and not force:
             target = counted(target)
         with (
-            file_result(target, "--save" if save else "--picture", force=force) as draft,
-            file_result(picture, "--picture", force=force) as drawing,
+            file_result(
+                target, "--save" if save else "--picture", force=force, suffix=".rrd"
+            ) as draft,
+            file_result(picture, "--picture", force=force, suffix=".png") as drawing,
         ):
             rerun.write_review(draft, read)
             if picture is not None:

@@ -8,6 +8,7 @@ from typing import TypeVar
 from pydantic import Field, model_validator
 
 from flexura.errors import WrongValue
+from flexura.io.quantities import note_turns
 
 from .toml_table import Table, above, from_zero
 
@@ -182,4 +183,5 @@ def _with_ordered_limits(sheet: _Sheet) -> _Sheet:
     if limits is not None and not limits[0] < limits[1]:
         expected = "the lower limit first, then a higher upper limit"
         raise WrongValue("limits_rad", list(limits), expected)
+    note_turns("limits_rad", *(limits or (0.0,)))
     return sheet

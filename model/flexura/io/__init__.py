@@ -19,6 +19,7 @@ from .arguments import (
 from .files import (
     DRAFT,
     FINISHED,
+    check_suffix,
     draft_of,
     leftovers,
     linked,
@@ -79,6 +80,7 @@ __all__ = [
     "check_format",
     "check_memory",
     "check_progress",
+    "check_suffix",
     "choice",
     "draft_of",
     "emulated",

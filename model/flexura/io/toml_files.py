@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 from pydantic import BaseModel
 
 from ..errors import InputError
-from .files import write_text
+from .files import check_suffix, write_text
 
 # Of a TOML or JSON file: its values are what the file says, until they are checked.
 Tables: TypeAlias = dict[str, Any]
@@ -73,9 +73,13 @@ def write_toml(path: str | os.PathLike[str], data: dict[str, Any], *, new: bool 
         path: of the file.
         data: the tables.
         new: no file may be there.
+
+    Raises:
+        InputError: its name does not end with .toml, or it cannot be written.
     """
     import tomli_w
 
+    check_suffix(path, ".toml", "path")
     write_text(path, tomli_w.dumps(data), new=new)
 
 

@@ -25,6 +25,7 @@ from ..signals import STARTS, Acting, Drive, LoadsLike, PayloadsLike
 from ..simulation.internal_forces import force_units
 from ..simulation.problem import MOST_STEPS, Budget, check_request
 from ..simulation.recorder import channel_units, sensor_units
+from ..simulation.start import note_motions
 from ..system import System, check_continuous
 from ..system.structure import structure
 
@@ -106,6 +107,7 @@ class Request:
     def fitted(self, robot: Robot) -> Request:
         """The request for robots like this one: with the default channels, and its names and shapes
         checked."""
+        note_motions(robot, self.drive, self.t)
         known, links = units_of(robot), robot.links
         default = [f"joint/{i}/position" for i in range(1, len(links) + 1)]
         default += [f"link/{i}/tip_deflection" for i, link in enumerate(links, 1) if link.flexible]

@@ -29,6 +29,7 @@ from ..io import (
     summary,
     write_toml,
 )
+from ..io.quantities import note_turns
 from .damping import rayleigh
 from .joint import KEYS, key_of
 from .link import LEAST_FREE, Link
@@ -97,6 +98,16 @@ class Robot(Table):
                 if joint.start < exit_m:
                     ahead = f"a start ahead of the sleeve of link {i}, at {exit_m:g} m or more"
                     raise WrongValue(f"{key}.{joint.key('start')}", joint.start, ahead)
+        return self
+
+    @model_validator(mode="after")
+    def _says_turns(self) -> Robot:
+        for i, link in enumerate(self.link, 1):
+            joint = link.joint
+            if joint.type == "R":
+                note_turns(f"link[{i}].joint.start_rad", joint.start)
+                note_turns(f"link[{i}].joint.limits_rad", *(joint.limits or (0.0,)))
+                note_turns(f"link[{i}].joint.spring.rest_rad", joint.spring_rest)
         return self
 
     @model_validator(mode="after")
@@ -383,7 +394,8 @@ def save(robot: Robot, path: str | os.PathLike[str], *, overwrite: bool = False)
         overwrite: whether a file that is there already may be replaced, as a whole.
 
     Raises:
-        InputError: a file is there already, or it cannot be written.
+        InputError: a file is there already, its name does not end with .toml, or it cannot be
+            written.
     """
     described, target = robot_of(robot), path_of(path, "path")
     if not overwrite:

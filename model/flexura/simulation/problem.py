@@ -14,7 +14,13 @@ from ..errors import InputError
 from ..io import Run, Tables, array, check_memory, choice, flag, number, whole
 from ..signals import Drive, Loads, LoadsLike, Manoeuvre, Signal, as_loads, as_signals
 from ..system import RobotLike, System, assemble
-from .start import apply_prescribed_motions, check_limits, consistent_start, state_at_end
+from .start import (
+    apply_prescribed_motions,
+    check_limits,
+    consistent_start,
+    note_motions,
+    state_at_end,
+)
 
 METHODS = ("auto", "explicit", "implicit", "exponential")
 SHORT = ("explicit-3", "explicit-5")  # what "auto" takes under a Controller whose ticks are short
@@ -167,6 +173,7 @@ def initial_value_problem(
     lengths = [link.length_m for link in system.robot.links]
     on_links = as_loads(loads, lengths, float(t[0]), float(t[-1]))
     accounts = np.zeros(4)
+    note_motions(system.robot, acting, t)
     if before is None:
         q, qd, start = consistent_start(system, t[0], acting, q0, qd0, start, on_links)
     else:

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 from ..control import PID, Controller
 from ..errors import InputError
 from ..io import Run, array, choice
+from ..io.quantities import note_turns
 from ..robot import Robot
-from ..signals import STARTS, Drive, Loads
+from ..signals import STARTS, Drive, Loads, evaluate_many
 from ..system import NoEquilibrium, System, static
 
 SLACK = 1e-9  # of a limit, or m or rad: a motion may begin on one, up to round-off
@@ -248,3 +249,19 @@ def _prescribed(drive: Any, joint: int) -> bool:
         return False
     own = drive.joints[joint]
     return not isinstance(own, PID) and own.prescribed and own.motion is not None
+
+
+def note_motions(robot: Robot, drive: Any, t: np.ndarray) -> None:
+    """Say motions of joints R over more than a turn, which may have been meant in degrees.
+
+    Args:
+        robot: the robot.
+        drive: a Drive or a Controller; others have no motions.
+        t: output times (T,) [s].
+    """
+    joints = zip(robot.links, getattr(drive, "joints", ()), strict=False)
+    for i, (link, joint) in enumerate(joints, 1):
+        motion = getattr(joint, "motion", None) or getattr(joint, "reference", None)
+        if link.joint.type == "R" and motion is not None and len(motion.segments):
+            y, _ = evaluate_many(motion.segments, t)
+            note_turns(f"motion of joint {i}", y[np.abs(y).argmax()])

@@ -273,6 +273,27 @@ def test_a_file_is_left_alone_without_force(place):
     assert (first[0], again[0]) == (0, 2)
 
 
+@pytest.mark.parametrize(
+    ("command", "key", "suffix"),
+    [
+        ("identify RUN --out a.csv", "--out", ".toml"),
+        ("identify rig RUN --fit payload.mass_kg --out a.csv", "--out", ".toml"),
+        ("import a.urdf --out a.csv", "--out", ".toml"),
+        ("new a.csv", "FILE", ".toml"),
+        ("review RUN --save a.csv", "--save", ".rrd"),
+        ("review RUN --picture a.csv", "--picture", ".png"),
+        ("compare RUN RUN --picture a.csv", "--picture", ".png"),
+    ],
+)
+def test_a_file_has_the_suffix_of_its_format(command, key, suffix, place):
+    fx.simulate("rig", np.arange(20) / 100).save(place / "RUN")
+    before = files(place)
+    status, out, err = run(command.split())
+    said = f"{key} = 'a.csv': expected a name that ends with {suffix}"
+    assert (status, out, err.count("\n")) == (2, "", 1) and said in err
+    assert files(place) == before
+
+
 def test_two_comparisons_of_a_run_stand_side_by_side(place):
     for name in ("a", "b"):
         assert run(["simulate", RIG, LAW, "--out", name])[0] == 0

@@ -206,7 +206,11 @@ def test_a_reading_through_a_filter_is_that_of_a_harmonic():
         ([MASS], {"channels": ["sensor/laser"]}, "no such channel"),
         ([MASS, MASS], {}, "each key once"),
         ([MASS], {"from_s": 0.79}, "16 samples"),
-        ([MASS], {"from_s": 5.0}, r"from_s, to_s = '5 to 0.8 s': .* part of the run, from 0 to 0.8"),
+        (
+            [MASS],
+            {"from_s": 5.0},
+            r"from_s, to_s = '5 to 0.8 s': .* part of the run, from 0 to 0.8",
+        ),
         ([MASS], {"from_s": 0.5, "to_s": 0.4}, "from_s, to_s = '0.5 to 0.4 s'"),
         ([], {}, "a key or more"),
     ],

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import flexura as fx
+from flexura.control import load_gains
 from robot_files import ABSENT, BASE, BY_NUMBER, CART, COMPLETE, STRIP, changed
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -221,6 +222,15 @@ def test_a_robot_file_that_is_there_is_replaced_only_if_that_is_asked_for(tmp_pa
     assert path.read_text() == "# mine\n"
     fx.save(robot, path, overwrite=True)
     assert fx.load(path) == robot
+
+
+@pytest.mark.parametrize("name", ["robot.csv", "robot", "robot.toml.txt"])
+def test_a_robot_file_ends_with_toml(name, tmp_path):
+    with pytest.raises(fx.InputError, match=r"path = .*: expected a name that ends with \.toml"):
+        fx.save(fx.load("rig"), tmp_path / name)
+    with pytest.raises(fx.InputError, match=r"ends with \.toml"):
+        load_gains("rig").write(tmp_path / name)
+    assert not any(tmp_path.iterdir())
 
 
 def test_saving_writes_the_whole_file_or_leaves_the_old_one(tmp_path, monkeypatch):

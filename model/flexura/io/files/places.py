@@ -39,6 +39,22 @@ def path_of(given: object, key: str) -> Path:
     return Path(os.fspath(given))
 
 
+def check_suffix(path: str | os.PathLike[str], suffix: str, key: str) -> None:
+    """Refuse a file whose name says that it has another format.
+
+    Args:
+        path: of the file to write.
+        suffix: how its name has to end.
+        key: name of the argument, for the message.
+
+    Raises:
+        InputError: it ends with something else.
+    """
+    if Path(path).suffix.lower() != suffix:
+        expected = f"expected a name that ends with {suffix}"
+        raise InputError(expected, key=key, value=os.fspath(path))
+
+
 def linked(path: str | os.PathLike[str]) -> Path:
     """The file that a link leads to, there or not.
 

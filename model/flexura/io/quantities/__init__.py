@@ -2,6 +2,7 @@
 
 from .channels import CHANNELS, STATIONS, Channel, channel, listed, meant
 from .clock import EPOCH_S, LATEST_S, fault, from_first, slow
+from .turns import note_turns
 from .units import Unit, check_unit, converted, is_unit, suffix, unit
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "is_unit",
     "listed",
     "meant",
+    "note_turns",
     "slow",
     "suffix",
     "unit",

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...errors import FlexuraError, InputError
 from ...io import Run, array, number, whole
+from ...io.quantities import note_turns
 from ...robot import Robot
 from ...signals import Drive, polynomial
 from ...system import RobotLike, System, assemble, static
@@ -175,7 +176,11 @@ def _positions(system: System, value: Any, key: str) -> np.ndarray:
         raise InputError(
             f"expected {joints} positions, one a joint of the robot", key=key, value=value
         )
-    return found.reshape(joints)
+    found = found.reshape(joints)
+    for i, link in enumerate(system.robot.links):
+        if link.joint.type == "R":
+            note_turns(f"{key} of joint {i + 1}", found[i])
+    return found
 
 
 def _solved(

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...io.quantities import note_turns
 from ...signals import FunctionSignal, Signal, as_signals
 from ...system import System
 
@@ -99,6 +100,8 @@ def tip_path(system: System, t: np.ndarray, tip: Any) -> TipPath:
         raise InputError("expected a path, not None", key="tip")
     path = TipPath(kind, tuple(s for s in signals if s), float(t[0]), float(t[-1]), angle)
     _check_rest(path)
+    if kind == ANGLE:
+        note_turns("polar angle of the tip", *(path.signals[0](float(at))[0] for at in t[[0, -1]]))
     return path
 
 
