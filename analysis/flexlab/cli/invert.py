@@ -200,13 +200,13 @@ def _place(text: str) -> list[float]:
 def table_of(path: Path, robot: fx.Robot) -> tuple[np.ndarray, Any]:
     """Times, and the path as `fx.invert` takes it, of a table: a log with the path's columns."""
     log = read_log(path)
-    moving = next((link.joint for link in robot.links if not link.joint.locked), None)
-    one = "angle" if moving is None or moving.type == "R" else "place"
-    wanted = ("t", "x", "y") if len(log.columns) == 3 else ("t", one)
+    moving = [link.joint.type for link in robot.links if not link.joint.locked]
+    wanted = ("t", "angle" if moving == ["R"] else "place") if len(moving) == 1 else ("t", "x", "y")
     heads = ", ".join(repr(column.head) for column in log.columns[:8])
     if len(log.columns) != len(wanted):
         raise fx.InputError(
-            f"expected the columns t, x, y or t, {one}; there are {len(log.columns)}: {heads}",
+            f"expected the columns {', '.join(wanted)} for this robot; there are "
+            f"{len(log.columns)}: {heads}",
             file=str(path),
         )
     named = [_of_path(column) for column in log.columns]

@@ -30,7 +30,11 @@ WRONG = {
     "a gap": ("rig --table gap.csv", "gap.csv: row 2 (line 3): a cell without a number"),
     "one column": (
         "rig --table one.csv",
-        "one.csv: expected the columns t, x, y or t, place; there are 1: 'x'",
+        "one.csv: expected the columns t, x, y for this robot; there are 1: 'x'",
+    ),
+    "a path for two joints": (
+        "single-r --table gap.csv",
+        "gap.csv: expected the columns t, angle for this robot; there are 3: 't'",
     ),
     "other heads": (
         "rig --table other.csv",

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-MOST = 20  # entries of a list in a message
+MOST = 12  # entries of a list in a message
 STATIONS = 9  # places along a flexible link at which a Run holds the deflection
 
 
@@ -289,7 +289,7 @@ def listed(names: Iterable[str]) -> str:
         names: of a run.
 
     Returns:
-        For example "tip/x, link/1/deflection/0 to 8", with at most 20 entries; "none" of none.
+        For example "tip/x, link/1/deflection/0 to 8", with at most 12 entries; "none" of none.
     """
     places: dict[str, list[int]] = {}
     for name in names:

@@ -93,7 +93,8 @@ def tip_path(system: System, t: np.ndarray, tip: Any) -> TipPath:
     if isinstance(tip, str | bytes | dict | set) or pair != _is_pair(tip, t, pair):
         counted = "two entries, (x, y)" if pair else "one entry, not a pair"
         text = f"expected a path of {counted}: so many of the robot's joints can move"
-        shown = "a function" if callable(tip) else tip
+        values = f"values of shape {tip.shape}" if isinstance(tip, np.ndarray) else tip
+        shown = "a function" if callable(tip) else values
         raise InputError(text, key="tip", value=shown)
     signals = as_signals(list(tip) if pair else [tip], 2 if pair else 1, "tip", t)
     if any(s is None for s in signals):
