@@ -22,7 +22,7 @@ from .drawing.over_time import figure, heading
 from .drawing.pictures import FORMS, saved
 from .files import path_of, refuse_taken, write_bytes
 from .frames import pandas_frame, xarray_dataset
-from .quantities import check_unit, converted, fault, from_first, listed, suffix, unit
+from .quantities import check_unit, converted, doubted, fault, from_first, listed, suffix, unit
 from .run_file import FILE
 from .toml_files import Tables
 
@@ -83,8 +83,7 @@ class Run:
 
     def _in_seconds(self) -> None:
         """Refuse a clock that is none; count from the first sample where it is a calendar's."""
-        measured = self.meta.get("source") == "experiment" and "imported" not in self.meta
-        wrong = fault(self.t, measured)
+        wrong = fault(self.t, doubted(self.meta))
         if wrong:
             raise InputError(wrong.text, key=f"row {wrong.row}")
         t, start = from_first(self.t)

@@ -259,8 +259,8 @@ def note_motions(robot: Robot, drive: Any, t: np.ndarray) -> None:
         drive: a Drive or a Controller; others have no motions.
         t: output times (T,) [s].
     """
-    joints = zip(robot.links, getattr(drive, "joints", ()), strict=False)
-    for i, (link, joint) in enumerate(joints, 1):
+    given = drive.joints if isinstance(drive, Drive | Controller) else ()
+    for i, (link, joint) in enumerate(zip(robot.links, given, strict=False), 1):
         motion = getattr(joint, "motion", None) or getattr(joint, "reference", None)
         if link.joint.type == "R" and motion is not None and len(motion.segments):
             y, _ = evaluate_many(motion.segments, t)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import flexura as fx
+from flexlab.runs.export import as_csv
 from flexura.io.logs import read_log, read_map, understood
 
 T = np.arange(20.0)
@@ -88,6 +89,8 @@ def test_a_slow_clock_is_read_where_its_unit_is_stated(head, asked, step, tmp_pa
     assert found.run.t[1] == pytest.approx(step if scale == 1 else 1.5, rel=1e-12)
     assert bool(asked) != any("samples a second: is" in note for note in found.notes)
     assert (fx.Run.read(found.run.save(tmp_path / "run")).t == found.run.t).all()
+    (tmp_path / "again.csv").write_bytes(as_csv.write(found.run))
+    assert (understood(read_log(tmp_path / "again.csv")).run.t == found.run.t).all()
 
 
 @pytest.mark.parametrize("head", ["t", "t [s]", "t_s"])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...errors import InputError
-from ..quantities import EPOCH_S, LATEST_S, fault, slow, unit
+from ..quantities import EPOCH_S, LATEST_S, doubted, fault, slow, unit
 from .log import Clock, Column, Log
 
 FASTEST_S = 2e-5  # most loggers of robots are slower
@@ -48,7 +48,14 @@ class Timebase:
 
 
 def in_time(said: str) -> bool:
-    """Whether a unit is one of time."""
+    """Whether a unit is one of time.
+
+    Args:
+        said: the unit, or "".
+
+    Returns:
+        True if it is.
+    """
     found = unit(said) if said else None
     return found is not None and found.si == "s"
 
@@ -92,7 +99,7 @@ def from_column(log: Log, column: Column, asked: str, scale: tuple[float, float]
     t = absolute
     if column.since is not None and absolute[0] > EPOCH_S:
         t = own.to_si(scale[0] * column.since)
-    measured = not log.own or log.meta.get("source") == "experiment"
+    measured = not log.own or doubted(log.meta)
     stated = bool(asked or column.calendar or own != unit("s"))
     _check(log, t, f"clock {column.head!r}", measured, float(absolute[0]), stated)
     if measured and not asked and not column.calendar:

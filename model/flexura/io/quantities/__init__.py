@@ -1,7 +1,7 @@
 """What numbers of a run mean: its channels, their units, its clock."""
 
 from .channels import CHANNELS, STATIONS, Channel, channel, listed, meant
-from .clock import EPOCH_S, LATEST_S, fault, from_first, slow
+from .clock import EPOCH_S, LATEST_S, doubted, fault, from_first, slow
 from .turns import note_turns
 from .units import Unit, check_unit, converted, is_unit, suffix, unit
 
@@ -15,6 +15,7 @@ __all__ = [
     "channel",
     "check_unit",
     "converted",
+    "doubted",
     "fault",
     "from_first",
     "is_unit",

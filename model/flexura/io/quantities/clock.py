@@ -3,7 +3,8 @@ those of a calendar."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,6 +47,19 @@ def fault(t: np.ndarray, measured: bool = False, stated: bool = False) -> Fault 
             'If it is in seconds, a map of the log says so: [time] unit = "s"',
         )
     return None
+
+
+def doubted(meta: Mapping[str, Any]) -> bool:
+    """Whether milliseconds may pass for seconds in a run: it was measured, and `flexura import` has
+    not looked at its clock.
+
+    Args:
+        meta: of the run.
+
+    Returns:
+        True if they may.
+    """
+    return meta.get("source") == "experiment" and "imported" not in meta
 
 
 def slow(t: np.ndarray) -> bool:
