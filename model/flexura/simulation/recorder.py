@@ -153,9 +153,10 @@ def fast(run: Run, robot: Robot) -> list[Tables]:
         beyond = np.flatnonzero(rates * (reach if turns else 1.0) > FAST_M_S)
         if beyond.size:
             k = int(beyond[0])
+            unit = "rad/s" if turns else "m/s"
             text = (
-                f"joint {i} moves at {rates[k]:.3g} {'rad/s' if turns else 'm/s'}, which takes a tip "
-                f"beyond {FAST_M_S:g} m/s: is a controller unstable, or a unit wrong?"
+                f"joint {i} moves at {rates[k]:.3g} {unit}, which takes a tip beyond "
+                f"{FAST_M_S:g} m/s: is a controller unstable, or a unit wrong?"
             )
             return [{"t": float(run.t[k]), "level": "WARN", "name": "fast", "text": text}]
     return []
