@@ -12,7 +12,14 @@ import flexura as fx
 from flexura.control import step_figures
 from flexura.io import find, read_toml, write_toml
 
-from ..identification.vibration.damped_sinusoids import Fit, Mode, changes, fit, strongest
+from ..identification.vibration.damped_sinusoids import (
+    Fit,
+    Mode,
+    changes,
+    fit,
+    lacks,
+    strongest,
+)
 from ..identification.vibration.record import Record, record
 from ..identification.vibration.shapers import KINDS, Shaper, shaped
 from ..runs.formatting import finite, number, percent
@@ -33,6 +40,7 @@ class Found:
     record: Record
     fit: Fit
     halves: tuple[Mode, ...]
+    lacks: dict[str, float] | None
     steps: dict[str, dict[str, float | None]]
 
     @property
@@ -83,7 +91,8 @@ def vibration(
     read = one_run(run, robot)
     part = record(read, channel, from_s, to_s)
     fitted = fit(part.t, part.y, modes)
-    found = Found(part, fitted, changes(fitted, part.t, part.y, modes), _steps(read))
+    halves = changes(fitted, part.t, part.y, modes)
+    found = Found(part, fitted, halves, lacks(fitted, part.t, part.y), _steps(read))
     if not fitted.modes:
         raise fx.InputError(
             f"no vibration stands out of the noise {part.why}: expected a free vibration",
@@ -157,6 +166,13 @@ def _tables(found: Found, run: fx.Run) -> list[Table]:
             f"the strongest mode is not linear: {first} Hz in the first half, {second} Hz in the "
             "second; the interval is of the whole"
         )
+    if found.lacks is not None:
+        modes.notes.append(
+            f"what is left about the strongest mode is {percent(found.lacks['share'])} of the "
+            f"vibration, {found.lacks['by_noise']:.2g} times the noise: another mode is near it, "
+            "or it changes; its damping ratio may be far outside the interval, and the shapers "
+            "take it"
+        )
     modes.notes.append("the frequency is the undamped one; amplitudes are at the start")
     longer = (f"{s.kind.upper()} {s.lengthens_s:.3g} s" for s in found.shapers)
     modes.notes.append(f"shapers of the strongest mode lengthen a motion by: {', '.join(longer)}")
@@ -187,6 +203,7 @@ def _data(found: Found) -> dict[str, Any]:
             for mode in found.fit.modes
         ],
         "halves_Hz": [mode.frequency for mode in found.halves],
+        "lacks": found.lacks,
         "noise": found.fit.noise,
         "unit": part.unit,
         "shapers": [shaper.tables()["shaper"] for shaper in found.shapers],

@@ -5,7 +5,7 @@
 w0 = 2 pi f is the undamped frequency, zeta the damping ratio. Modes are found one after the other
 at the highest peak of the remainder's spectrum (RELAX: Li and Stoica 1996, IEEE Trans. Signal
 Processing 44, 281-295), and all are fitted together. A mode is kept if it makes the fit better
-than noise does. Intervals come from the Jacobian and the remainder's variance.
+than noise does, and one near another if a single mode that changes does not explain both. Intervals come from the Jacobian and the remainder's variance.
 """
 
 from __future__ import annotations
@@ -14,12 +14,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .least_squares import (
+    amplitudes_of,
+    columns,
+    derivatives,
+    left_by_a_changing_mode,
+    line,
+    solve,
+)
+from .remainder import NEAR, coloured, lacking, level, peak
+
 FOUR = 4  # numbers a mode: frequency, damping ratio, two amplitudes
 PENALTY = 6.0  # of a mode, times ln(samples): noise makes a false one in far less than 1 of 1000
 SMALLEST = 1e-4  # of the vibration's energy: what is less is no mode
-RATIOS = (0.002, 0.01, 0.03, 0.1, 0.3)  # of damping, to begin with
-MOST_RATIO = 0.7
-STEPS = 60
+SAME = 0.25  # resolutions: two modes that are nearer are one
+LACKING, LEFT = 0.01, 3.0  # by the vibration, and by the noise: more is told
+DEGREES = (4, 6)  # of the polynomials of a mode that changes
 
 
 @dataclass(frozen=True)
@@ -75,29 +85,32 @@ def fit(t: np.ndarray, y: np.ndarray, most: int = 4) -> Fit:
         return Fit((), np.full(len(y), float(y.mean())), 0.0)
     z = y / scale
     shapes = np.zeros((0, 2))  # w0, zeta of each mode
-    left = z - _line(t, z)
+    left = z - line(t, z)
     energy = left_energy = float(left @ left)
+    refused: list[float] = []
     while len(shapes) < most:
-        start = _peak(t, left)
-        if start is None or _close(start, shapes, t):
+        start = peak(t, left, refused)
+        if start is None:
             break
-        tried = _solve(t, z, np.vstack([shapes, start]))
-        if tried is None:
-            break
-        rest = z - _basis(t, tried)[0] @ _amplitudes(t, z, tried)
+        tried, rest = _with_another(t, z, shapes, start)
         now = float(rest @ rest)
         if now <= 0.0 or len(z) - FOUR * len(tried) - 2 < 1:
             shapes, left, left_energy = tried, rest, now
             break
-        gain = len(z) * np.log(left_energy / now) if now < left_energy else 0.0
-        if gain < PENALTY * FOUR * np.log(len(z)) or left_energy - now < SMALLEST * energy:
+        floor = now * max(level(t, rest, start[0]), 1.0)
+        gain = len(z) * np.log1p(max(left_energy - now, 0.0) / floor)
+        enough = gain >= PENALTY * FOUR * np.log(len(z)) and left_energy - now >= SMALLEST * energy
+        if enough and _apart(t, z, tried, rest):
+            shapes, left, left_energy = tried, rest, now
+        elif _near(start[0], shapes, t).any():
+            refused.append(start[0])  # no mode is there; one may be elsewhere
+        else:
             break
-        shapes, left, left_energy = tried, rest, now
     if not len(shapes):
         return Fit((), scale * (z - left), float(np.std(left)) * scale)
-    basis, slopes = _basis(t, shapes)
-    amplitudes = _amplitudes(t, z, shapes)
-    jacobian = np.hstack([basis, _derivatives(slopes, amplitudes, len(shapes))])
+    basis, slopes = columns(t, shapes)
+    amplitudes = amplitudes_of(t, z, shapes)
+    jacobian = np.hstack([basis, derivatives(slopes, amplitudes, len(shapes))])
     degrees = max(len(z) - jacobian.shape[1], 1)
     variance = left_energy / degrees
     size = np.linalg.norm(jacobian, axis=0)
@@ -106,7 +119,7 @@ def fit(t: np.ndarray, y: np.ndarray, most: int = 4) -> Fit:
     quantile = float(student.ppf(0.975, degrees))
     modes = []
     for m, (w0, zeta) in enumerate(shapes):
-        own = np.sqrt(_coloured(t, left, w0))
+        own = np.sqrt(coloured(t, left, w0))
         std = own * stds[basis.shape[1] + 2 * m : basis.shape[1] + 2 * m + 2]
         amplitude = scale * float(np.hypot(*amplitudes[2 + 2 * m : 4 + 2 * m]))
         modes.append(
@@ -132,12 +145,15 @@ def changes(found: Fit, t: np.ndarray, y: np.ndarray, most: int = 4) -> tuple[Mo
     """The strongest mode in both halves of a record, if its frequency changes; else nothing.
 
     It changes if both values differ by more than four standard deviations: what rings is not
-    linear.
+    linear. With another mode near it, halves do not say so.
     """
     if not found.modes:
         return ()
     whole = strongest(found, float(t[-1] - t[0]))
     half = len(t) // 2
+    shapes = np.array([[2 * np.pi * mode.frequency, mode.ratio] for mode in found.modes])
+    if _near(2 * np.pi * whole.frequency, shapes, t[: half + 1] - t[0]).sum() > 1:
+        return ()  # a half may not tell two modes apart
     both = []
     for part in (slice(None, half), slice(half, None)):
         modes = fit(t[part], y[part], most).modes
@@ -150,118 +166,72 @@ def changes(found: Fit, t: np.ndarray, y: np.ndarray, most: int = 4) -> tuple[Mo
     return tuple(both) if apart > 4 * np.hypot(first.frequency_std, second.frequency_std) else ()
 
 
-def _line(t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """The straight line through y."""
-    basis = np.column_stack([np.ones_like(t), t / t[-1]])
-    return basis @ np.linalg.lstsq(basis, y, rcond=None)[0]
+def lacks(found: Fit, t: np.ndarray, y: np.ndarray) -> dict[str, float] | None:
+    """What a fit lacks about its strongest mode: another one near it, or one that changes.
 
-
-def _poles(shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """s (M,), and its derivatives by w0 and zeta."""
-    w0, zeta = shapes[:, 0], shapes[:, 1]
-    root = np.sqrt(np.maximum(1 - zeta**2, 1e-12))
-    by_frequency = -zeta + 1j * root
-    return w0 * by_frequency, by_frequency, -w0 - 1j * w0 * zeta / root
-
-
-def _basis(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (T, 2 + 2M): 1, t, then Re and -Im of exp(s t); and t exp(s t) ds/d(w0, zeta)."""
-    poles, by_frequency, by_ratio = _poles(shapes)
-    waves = np.exp(np.outer(t, poles))
-    columns = [np.ones_like(t), t / t[-1]]
-    for wave in waves.T:
-        columns += [wave.real, -wave.imag]
-    slopes = np.stack([t[:, None] * waves * by_frequency, t[:, None] * waves * by_ratio], axis=2)
-    return np.column_stack(columns), slopes
-
-
-def _amplitudes(t: np.ndarray, y: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-    return np.linalg.lstsq(_basis(t, shapes)[0], y, rcond=None)[0]
-
-
-def _derivatives(slopes: np.ndarray, amplitudes: np.ndarray, count: int) -> np.ndarray:
-    """Derivatives of y by w0 and zeta of each mode, (T, 2M)."""
-    complex_amplitudes = amplitudes[2::2][:count] + 1j * amplitudes[3::2][:count]
-    return np.real(slopes * complex_amplitudes[None, :, None]).reshape(len(slopes), 2 * count)
-
-
-def _solve(t: np.ndarray, y: np.ndarray, shapes: np.ndarray) -> np.ndarray | None:
-    """All modes together by Levenberg and Marquardt; amplitudes are solved for in each step."""
-    shapes = shapes.copy()
-    basis, slopes = _basis(t, shapes)
-    amplitudes = np.linalg.lstsq(basis, y, rcond=None)[0]
-    rest = y - basis @ amplitudes
-    cost, damping = float(rest @ rest), 1e-4
-    fastest = 1.1 * np.pi * (len(t) - 1) / t[-1]
-    for _ in range(STEPS):
-        jacobian = np.hstack([basis, _derivatives(slopes, amplitudes, len(shapes))])
-        size = np.linalg.norm(jacobian, axis=0)
-        size[size == 0] = 1.0
-        normal = (jacobian / size).T @ (jacobian / size)
-        gradient = (jacobian / size).T @ rest
-        better = False
-        for _ in range(12):
-            step = np.linalg.solve(normal + damping * np.eye(len(normal)), gradient) / size
-            tried = shapes + step[basis.shape[1] :].reshape(-1, 2)
-            inside = (tried[:, 0] > 0) & (tried[:, 0] < fastest)
-            if inside.all():
-                # growing waves stay finite: exp(1) at the end
-                tried[:, 1] = np.clip(tried[:, 1], -1 / (tried[:, 0] * t[-1]), 0.95)
-                new_basis, new_slopes = _basis(t, tried)
-                new = np.linalg.lstsq(new_basis, y, rcond=None)[0]
-                rest_new = y - new_basis @ new
-                if float(rest_new @ rest_new) <= cost:
-                    better = True
-                    break
-            damping *= 10
-        if not better:
-            break
-        change = np.abs(tried - shapes) / np.column_stack([shapes[:, 0], np.ones(len(shapes))])
-        fell = cost - float(rest_new @ rest_new)
-        shapes, basis, slopes, amplitudes, rest = tried, new_basis, new_slopes, new, rest_new
-        cost, damping = float(rest @ rest), max(damping / 10, 1e-12)
-        if change.max() < 1e-9 or fell <= 1e-14 * cost:
-            break
-    ringing = (np.abs(shapes[:, 1]) < MOST_RATIO) & (shapes[:, 0] * t[-1] > 2 * np.pi)
-    return shapes if ringing.all() else None
-
-
-def _peak(t: np.ndarray, left: np.ndarray) -> np.ndarray | None:
-    """w0 and zeta of the highest peak of the remainder's spectrum, and the best of some ratios."""
-    step = float(t[-1]) / (len(t) - 1)
-    even = np.interp(np.arange(len(t)) * step, t, left)
-    spectrum = np.abs(np.fft.rfft(even, 4 * len(even)))
-    at = np.fft.rfftfreq(4 * len(even), step)
-    spectrum[at * t[-1] < 1.0] = 0.0
-    k = int(spectrum.argmax())
-    if spectrum[k] == 0.0:
-        return None
-    found = [np.array([2 * np.pi * at[k], ratio]) for ratio in RATIOS]
-    costs = []
-    for each in found:
-        basis = _basis(t, each[None])[0][:, 2:]
-        rest = left - basis @ np.linalg.lstsq(basis, left, rcond=None)[0]
-        costs.append(float(rest @ rest))
-    return found[int(np.argmin(costs))]
-
-
-def _close(start: np.ndarray, shapes: np.ndarray, t: np.ndarray) -> bool:
-    """Whether a mode is there already: closer than the record's resolution, or half a bandwidth."""
-    wide = np.maximum(2 * np.pi / t[-1], 2 * np.abs(shapes[:, 1]) * shapes[:, 0])
-    return bool((np.abs(shapes[:, 0] - start[0]) < wide).any())
-
-
-def _coloured(t: np.ndarray, left: np.ndarray, w0: float) -> float:
-    """The remainder's power at a mode's frequency over its mean power; 1 unless it is well above.
-
-    Noise that is not white makes intervals wider, where it is stronger at the mode.
+    Returns:
+        `share`: the RMS of what is left about it by that of the fit; `by_noise`: by the noise
+        there. None: nothing worth a word.
     """
-    step = float(t[-1]) / (len(t) - 1)
-    even = np.interp(np.arange(len(t)) * step, t, left)
-    power = np.abs(np.fft.rfft(even)[1:]) ** 2
-    k = round(w0 / (2 * np.pi) * step * len(t)) - 1
-    wide = max(8, len(power) // 50)
-    part = power[max(k - wide, 0) : k + wide + 1]
-    share = float(part.mean() / power.mean()) if len(part) and power.mean() > 0 else 1.0
-    significant = 1 + 4 / np.sqrt(max(len(part), 1))
-    return share if share > significant else 1.0
+    if not found.modes:
+        return None
+    t = t - t[0]
+    w0 = 2 * np.pi * strongest(found, float(t[-1])).frequency
+    rms, by_noise = lacking(t, y - found.values, w0)
+    share = rms / float(np.std(found.values))
+    much = share > LACKING and by_noise > LEFT
+    return {"share": share, "by_noise": by_noise} if much else None
+
+
+def _near(w0: float, shapes: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Which modes (M,) are near a frequency: some resolutions of the record, or a bandwidth."""
+    wide = np.maximum(NEAR * 2 * np.pi / t[-1], 2 * np.abs(shapes[:, 1]) * shapes[:, 0])
+    return np.asarray(np.abs(shapes[:, 0] - w0) < wide)
+
+
+def _with_another(
+    t: np.ndarray, z: np.ndarray, shapes: np.ndarray, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The modes (M + 1, 2) fitted with one more from `start` on, and what they leave (T,).
+
+    A mode that is near may be two that were fitted as one: the fit begins from two in its place
+    too, and the better fit counts. Without any that ends with modes that ring: those of now.
+    """
+    starts = [np.vstack([shapes, start])]
+    if _near(start[0], shapes, t).any():
+        m = int(np.argmin(np.abs(shapes[:, 0] - start[0])))
+        for side in (np.pi / t[-1], -np.pi / t[-1]):
+            both = np.vstack([shapes, shapes[m]])
+            both[[m, -1], 0] += [side, -side]
+            both[[m, -1], 1] /= 2
+            starts.append(both)
+    ends = [tried for tried in (solve(t, z, each) for each in starts) if tried is not None]
+    rests = [z - columns(t, end)[0] @ amplitudes_of(t, z, end) for end in (ends or [shapes])]
+    best = int(np.argmin([rest @ rest for rest in rests]))
+    return (ends or [shapes])[best], rests[best]
+
+
+def _apart(t: np.ndarray, z: np.ndarray, shapes: np.ndarray, rest: np.ndarray) -> bool:
+    """Whether modes that are near each other are two, and not one that changes with its amplitude.
+
+    The changing mode is Re exp(p0 + p1 t + ...). With a few numbers more than two modes have, it
+    must leave significantly more than they do; with many more, not significantly less.
+
+    Args:
+        t: times (T,) from 0 on [s].
+        z: values (T,).
+        shapes: w0 and zeta of the modes (M, 2).
+        rest: what the modes leave (T,).
+    """
+    basis, amplitudes = columns(t, shapes)[0], amplitudes_of(t, z, shapes)
+    power, least = float(rest @ rest), PENALTY * np.log(len(z)) / len(z)
+    for m in range(len(shapes)):
+        for k in m + 1 + np.flatnonzero(_near(shapes[m, 0], shapes[m + 1 :], t)):
+            if abs(shapes[m, 0] - shapes[k, 0]) * t[-1] < SAME * 2 * np.pi:
+                return False
+            own = [2 + 2 * m, 3 + 2 * m, 2 + 2 * k, 3 + 2 * k]
+            both = rest + basis[:, own] @ amplitudes[own]
+            few, many = (left_by_a_changing_mode(t, both, shapes[[m, k]], n) for n in DEGREES)
+            if np.log(few / power) < least or np.log(power / many) > least:
+                return False
+    return True
