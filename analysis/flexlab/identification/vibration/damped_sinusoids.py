@@ -5,7 +5,8 @@
 w0 = 2 pi f is the undamped frequency, zeta the damping ratio. Modes are found one after the other
 at the highest peak of the remainder's spectrum (RELAX: Li and Stoica 1996, IEEE Trans. Signal
 Processing 44, 281-295), and all are fitted together. A mode is kept if it makes the fit better
-than noise does, and one near another if a single mode that changes does not explain both. Intervals come from the Jacobian and the remainder's variance.
+than noise does, and one near another if a single mode that changes does not explain both. Intervals
+come from the Jacobian and the remainder's variance.
 """
 
 from __future__ import annotations

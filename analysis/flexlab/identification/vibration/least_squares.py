@@ -29,6 +29,7 @@ def columns(t: np.ndarray, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def amplitudes_of(t: np.ndarray, y: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+    """The factors of `columns` (2 + 2M,) that fit y best."""
     return np.linalg.lstsq(columns(t, shapes)[0], y, rcond=None)[0]
 
 

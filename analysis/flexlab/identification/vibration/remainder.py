@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .least_squares import amplitudes_of, columns
+from .least_squares import columns
 
 RATIOS = (0.002, 0.01, 0.03, 0.1, 0.3)  # of damping, to begin with
 NEAR = 3.0  # resolutions of a record, 1 / length: modes that are nearer may be one
