@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..estimate import Estimate
-from .model import PLAIN, read, settings_of
+from .inputs import force_unit, noise, rate_at_start
+from .model import AT_START, PLAIN, read, settings_of
 
 if TYPE_CHECKING:
     from .search import Search
@@ -19,16 +20,17 @@ ALIKE = 0.95  # correlation of two estimates that hardly differ in their effect
 SAME = 1e-5  # smallest singular value of the scaled derivatives, by the largest: no difference
 OFF = 0.2  # of the file's value: further away is told
 LEFT = 3.0  # residual by noise: the model lacks something
+BEGUN = 0.02  # of a channel's peak, between its first reading and the simulation's
 EXPLAINED = 0.2  # of the residual's square, by one more quantity of a channel
 
 
 def told(found: Estimate) -> set[str]:
     """The names of parameters that the runs tell."""
     J = found.derivatives.reshape(len(found.parameters), -1)
-    out = set()
+    out, unknown = set(), {*_mixed(found), *without_effect(found)}
     for k, u in enumerate(found.parameters):
         variance = found.covariance[k, k]
-        if np.isfinite(variance) and variance >= 0 and u.name not in _mixed(found):
+        if np.isfinite(variance) and variance >= 0 and u.name not in unknown:
             out.add(u.name)
     return out if J.any() else set()
 
@@ -88,6 +90,7 @@ def sentences(search: Search, found: Estimate, quantities: Sequence[object]) -> 
     ]
     out += _off(quantities)
     out += _of_inputs(search, found)
+    out += _starts(search, found)
     out += _left(search, found)
     out += _channels(search, found)
     return out
@@ -125,18 +128,44 @@ def _off(quantities: Sequence[object]) -> list[str]:
 
 
 def _of_inputs(search: Search, found: Estimate) -> list[str]:
-    """Estimates whose intervals are mostly what the noise of measured motions does to them."""
-    if not found.mostly_of_inputs.any():
-        return []
+    """Estimates whose intervals are mostly what measured motions do to them."""
     named = zip(found.parameters, found.mostly_of_inputs, strict=True)
-    names = [u.name for u, mostly in named if mostly]
+    idle = without_effect(found)
+    names = [u.name for u, mostly in named if mostly and u.name not in idle]
+    if not names:
+        return []
     first = search.experiments[0]
     motions = [each.channel for each in first.inputs if each.channel in first.run]
     return [
         f"{', '.join(names)}: most of the interval comes from the noise of the measured motion "
-        f"{', '.join(motions)}, which is an input; a drive, or the reference of a controller that "
-        "is known, has none"
+        f"{', '.join(motions)}, which is an input, or from what it does between its samples; a "
+        "drive, or the reference of a controller that is known, has none"
     ]
+
+
+def _starts(search: Search, found: Estimate) -> list[str]:
+    """Runs that do not begin at rest, as a fit does."""
+    values, out = {**search.fixed, **found.values}, []
+    for each in search.experiments:
+        for given in each.inputs:
+            rate = rate_at_start(each.run, given)
+            if rate:
+                unit = "rad/s" if force_unit(search.robot, given.joint) == "N m" else "m/s"
+                out.append(
+                    f"joint {given.joint} moves at once, at {rate:.3g} {unit}; a fit begins at "
+                    "rest. A run that begins in motion makes the estimates wrong"
+                )
+        first = int(np.argmax(each.counted.any(axis=0)))
+        for name, y, z in zip(
+            each.channels, each.measured, each.readings(search.robot, values), strict=True
+        ):
+            off = abs(z[0] - y[0])
+            if first == 0 and off > max(AT_START * noise(y), BEGUN * float(np.nanmax(np.abs(y)))):
+                out.append(
+                    f"{name}: begins at {y[0]:.3g}, and in the simulation at {z[0]:.3g}: the run "
+                    "does not begin at rest, or the channel's zero is off"
+                )
+    return list(dict.fromkeys(out))
 
 
 def _left(search: Search, found: Estimate) -> list[str]:

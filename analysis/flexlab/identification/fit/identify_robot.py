@@ -294,7 +294,7 @@ def _search(search: Search, progress: Callable[[float], None]) -> tuple[Search, 
         values = search.fit(values, window).values
         progress(0.3 + 0.4 * (k + 1) / len(windows))
     found = search.weighted_fit(values)
-    if found.mostly_of_inputs.any():
+    if found.mostly_of_inputs.any() and not all(each.exact for each in search.experiments):
         other = search.smoother()
         again = other.weighted_fit(found.values)
         narrower = np.diag(again.covariance) / np.diag(found.covariance)

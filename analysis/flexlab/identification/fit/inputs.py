@@ -29,6 +29,7 @@ from ...comparison.replay.smoothing import (
 MOTION, FORCE, REFERENCE = "motion", "force", "reference"
 _GIVEN = re.compile(r"(?:(\d{1,3}):)?(.+)")
 _OF_JOINT = re.compile(r"joint/(\d{1,3})/(\w+)")
+SLOW = 0.05  # of a joint's fastest rate: less is at rest
 _MEDIAN = 0.674490  # the median's size, by the standard deviation
 
 
@@ -145,9 +146,13 @@ def wave(run: fx.Run, given: Input, smoother: bool = False) -> Signal:
     """
     t, y = recorded_samples(run.t, run[given.channel], given.channel)
     if given.kind == MOTION:
+        rates = exact_rates(run, given)
+        if rates is not None:
+            return hermite(t, y, rates)
         if resolution(y):
-            return smoothing_spline(t, y)
-        return smoothing_spline(t, y, noise(y) * np.sqrt(12)) if smoother else smoothed(t, y)
+            return from_rest(smoothing_spline(t, y))
+        step = noise(y) * np.sqrt(12)
+        return from_rest(smoothing_spline(t, y, step) if smoother else smoothed(t, y))
     if held := _hold_s(run, given, t):
         return _steps(t, y, held)
     if given.kind == FORCE:
@@ -155,6 +160,66 @@ def wave(run: fx.Run, given: Input, smoother: bool = False) -> Signal:
     rows = np.zeros((len(t), COLUMNS))
     rows[:, 0], rows[:, 1], rows[:-1, 2] = t, y, np.diff(y) / np.diff(t)
     return Signal(rows, {"kind": "linear", "t_s": t.tolist(), "y": y.tolist()})
+
+
+def exact_rates(run: fx.Run, given: Input) -> np.ndarray | None:
+    """The rates (k,) of a motion's samples, where a simulation recorded them beside positions
+    without noise; else None.
+
+    A spline of the positions alone begins with a rate that the joint did not have: one that is
+    released moves at its rate within less than a sample.
+    """
+    name = given.channel.replace("position", "velocity")
+    if given.kind != MOTION or run.meta.get("source") != "simulation" or name not in run:
+        return None
+    t, y = recorded_samples(run.t, run[given.channel], given.channel)
+    rates = run[name][np.isfinite(run[given.channel])]
+    if not np.isfinite(rates).all():
+        return None
+    # what positions and rates differ by, and what the rates' curvature leaves room for
+    off = np.abs(np.diff(y) - np.diff(t) * (rates[1:] + rates[:-1]) / 2)
+    room = np.median(np.diff(t)) * np.median(np.abs(np.diff(rates, 2)))
+    return rates if np.median(off) <= room + 1e-9 * np.ptp(y) else None
+
+
+def rate_at_start(run: fx.Run, given: Input) -> float:
+    """The rate with which a joint moves at once; 0 if it begins at rest as far as the run tells.
+
+    Where a simulation did not record the rate, it is that between the first samples of a motion, if
+    it is more than their noise and more than SLOW of the fastest.
+    """
+    name = f"joint/{given.joint}/velocity"
+    if run.meta.get("source") == "simulation" and name in run:
+        rates = run[name][np.isfinite(run[name])]
+        return float(rates[0]) if abs(rates[0]) > SLOW * np.abs(rates).max() else 0.0
+    if given.kind != MOTION:
+        return 0.0
+    t, y = recorded_samples(run.t, run[given.channel], given.channel)
+    rates = np.diff(y) / np.diff(t)
+    least = max(6 * noise(y), 2 * resolution(y))
+    fast = abs(rates[0]) > SLOW * np.abs(rates).max() and abs(y[1] - y[0]) > least
+    return float(rates[0]) if fast else 0.0
+
+
+def hermite(t: np.ndarray, y: np.ndarray, rates: np.ndarray) -> Signal:
+    """The cubic polynomials through positions with their rates (k,); the last one goes on."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    rows = np.zeros((len(t) - 1, COLUMNS))
+    rows[:, 0] = t[:-1]
+    rows[:, 1:5] = CubicHermiteSpline(t, y, rates).c[::-1].T
+    return Signal(rows, {"kind": "hermite", "t_s": t.tolist(), "y": y.tolist()})
+
+
+def from_rest(motion: Signal) -> Signal:
+    """A motion that begins at rest: its first polynomial gets the rate within its own length."""
+    rows = motion.segments.copy()
+    if len(rows) < 2:
+        return motion
+    t = rows[:2, 0]
+    (begin, _, _), (end, rate, _) = motion(t[0]), motion(t[1])
+    rows[0] = hermite(t, np.array([begin, end]), np.array([0.0, rate])).segments[0]
+    return Signal(rows, motion.spec)
 
 
 def _hold_s(run: fx.Run, given: Input, t: np.ndarray) -> float:

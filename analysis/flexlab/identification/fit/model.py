@@ -12,7 +12,8 @@ import flexura as fx
 from flexura.control import Gains
 from flexura.signals import JointDrive, Signal
 
-from .inputs import FORCE, MOTION, REFERENCE, Input, misread, noise, wave
+from ...comparison.replay.smoothing import MIN_SAMPLES
+from .inputs import FORCE, MOTION, REFERENCE, Input, exact_rates, misread, noise, wave
 from .unknowns import CUTOFF_RATIO, of_channel
 
 RTOL = 1e-7
@@ -58,14 +59,38 @@ class Experiment:
         return {each.joint: wave(run, each, self.smoother) for each in self.inputs}
 
     def misread(self, seed: int) -> Experiment | None:
-        """The same under motions as they might have been measured; None: no joint is prescribed."""
-        moved = [each for each in self.inputs if each.kind == MOTION]
+        """The same under motions as they might have been measured; None: none has noise."""
+        motions = [each for each in self.inputs if each.kind == MOTION]
+        moved = [each for each in motions if exact_rates(self.run, each) is None]
         if not moved:
             return None
         read = {
             each.channel: misread(self.run, each, self.waves[each.joint], seed) for each in moved
         }
         other = replace(self.run, channels={**self.run.channels, **read})
+        return replace(self, moved_by=other, _cache={})
+
+    @property
+    def exact(self) -> bool:
+        """Whether no joint is prescribed by a motion that has noise."""
+        return all(
+            exact_rates(self.run, each) is not None for each in self.inputs if each.kind == MOTION
+        )
+
+    def coarser(self) -> Experiment | None:
+        """The same under motions of which every second sample is known; None: none is prescribed,
+        or too few are."""
+        moved = [each.channel for each in self.inputs if each.kind == MOTION]
+        known = {}
+        for name in moved:
+            known[name] = self.run[name].copy()
+            there = np.flatnonzero(np.isfinite(known[name]))
+            if len(there) < 2 * MIN_SAMPLES + 2:
+                return None
+            known[name][there[1:-1:2]] = np.nan
+        if not moved:
+            return None
+        other = replace(self.run, channels={**self.run.channels, **known})
         return replace(self, moved_by=other, _cache={})
 
     def simulate(
@@ -96,7 +121,9 @@ class Experiment:
             own = {key: value for key, value in acting.items() if not of_channel(key)[0]}
             made = robot.replace(self.starts(robot) | own)
             system, drive = fx.assemble(made), self._drive(made, acting)
-            self._cache[key] = fx.simulate(system, t, drive, rtol=RTOL).uninterrupted()
+            straight = "straight" if self.run.meta.get("start") == "straight" else None
+            run = fx.simulate(system, t, drive, rtol=RTOL, start=straight)
+            self._cache[key] = run.uninterrupted()
         return self._cache[key]
 
     def starts(self, robot: fx.Robot) -> dict[str, float]:

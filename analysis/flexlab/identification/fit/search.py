@@ -18,6 +18,8 @@ STEPS = 30  # of one fit
 WEIGHTED = 4  # fits with weights of the one before
 SETTLED = 0.01  # change of the weights that ends this
 DRAWS = 8  # of the noise of measured motions
+IDLE = 1e-8  # of the largest derivative: nothing but round-off
+UNEXPLAINED = 3.0  # standard deviations: a change that noise does not make
 FAILED = 1e3  # a residual of a simulation that ended early
 LEAST_NOISE = 1e-6  # of a channel's size
 
@@ -185,26 +187,35 @@ class Search:
         )
 
     def _of_inputs(self, values: Mapping[str, float], J: np.ndarray) -> np.ndarray:
-        """What the noise of measured motions does to the scaled values: the mean square (k, k) of
-        their changes where the motions are smoothed again from other readings of the same noise."""
+        """What measured motions do to the scaled values: a mean square (k, k) of changes.
+
+        For their noise, motions are smoothed again from other readings of the same noise. For what
+        they do between samples, every second one is left out: that change counts where the noise
+        does not explain it.
+        """
         flat = J.reshape(len(J), -1)
         size = np.linalg.norm(flat, axis=1)
-        out, there = np.zeros((len(J), len(J))), size > 0
+        out, there = np.zeros((len(J), len(J))), size > IDLE * size.max()
+        if not there.any():
+            return out
         base = self.residuals_at(values)
+        scaled = (flat[there] / size[there, None]).T
+
+        def moved(others: Sequence[Experiment | None]) -> np.ndarray:
+            change = np.zeros(len(J))
+            if any(others):
+                drawn = [other or own for own, other in zip(self.experiments, others, strict=True)]
+                r = (self.residuals_at(values, experiments=drawn) - base).ravel()
+                change[there] = -np.linalg.lstsq(scaled, r, rcond=None)[0] / size[there]
+            return change
+
         for seed in range(DRAWS):
-            others = [each.misread(seed) for each in self.experiments]
-            if not there.any() or all(other is None for other in others):
-                break
-            drawn = [
-                own if other is None else other
-                for own, other in zip(self.experiments, others, strict=True)
-            ]
-            change = (self.residuals_at(values, experiments=drawn) - base).ravel()
-            moved = np.zeros(len(J))
-            scaled = (flat[there] / size[there, None]).T
-            moved[there] = -np.linalg.lstsq(scaled, change, rcond=None)[0] / size[there]
-            out += np.outer(moved, moved) / DRAWS
-        return out
+            change = moved([each.misread(seed) for each in self.experiments])
+            out += np.outer(change, change) / DRAWS
+        change = moved([each.coarser() for each in self.experiments])
+        change[change**2 < UNEXPLAINED**2 * np.diag(out)] = 0.0
+        # a motion between samples is wrong by the first power of their distance, or a higher one
+        return out + np.outer(change, change) / 4
 
     def _lag(self, r: np.ndarray) -> int:
         """Samples over which residuals hang together: 0 for white ones."""
