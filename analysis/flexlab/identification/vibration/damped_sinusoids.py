@@ -227,7 +227,7 @@ def _apart(t: np.ndarray, z: np.ndarray, shapes: np.ndarray, rest: np.ndarray) -
     basis, amplitudes = columns(t, shapes)[0], amplitudes_of(t, z, shapes)
     power, least = float(rest @ rest), PENALTY * np.log(len(z)) / len(z)
     for m in range(len(shapes)):
-        for k in m + 1 + np.flatnonzero(_near(shapes[m, 0], shapes[m + 1 :], t)):
+        for k in (m + 1 + np.flatnonzero(_near(shapes[m, 0], shapes[m + 1 :], t))).tolist():
             if abs(shapes[m, 0] - shapes[k, 0]) * t[-1] < SAME * 2 * np.pi:
                 return False
             own = [2 + 2 * m, 3 + 2 * m, 2 + 2 * k, 3 + 2 * k]
