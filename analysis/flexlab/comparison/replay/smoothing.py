@@ -12,7 +12,7 @@ import numpy as np
 
 from flexura import signals
 from flexura.errors import InputError
-from flexura.signals import Signal
+from flexura.signals import COLUMNS, Signal
 
 MIN_SAMPLES = 8  # samples of a motion
 REST_S = 0.25  # how long before its start a motion is continued at rest
@@ -69,6 +69,27 @@ def continue_past_end(t: np.ndarray, y: np.ndarray) -> Signal:
     """The natural cubic spline through (t, y), which continues past its end."""
     through = signals.table(t, y)
     return Signal(through.segments[:-1], through.spec)
+
+
+def hermite(t: np.ndarray, y: np.ndarray, rates: np.ndarray) -> Signal:
+    """The cubic polynomials through positions with their rates (k,); the last one goes on."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    rows = np.zeros((len(t) - 1, COLUMNS))
+    rows[:, 0] = t[:-1]
+    rows[:, 1:5] = CubicHermiteSpline(t, y, rates).c[::-1].T
+    return Signal(rows, {"kind": "hermite", "t_s": t.tolist(), "y": y.tolist()})
+
+
+def from_rest(motion: Signal) -> Signal:
+    """A motion that begins at rest: its first polynomial gets the rate within its own length."""
+    rows = motion.segments.copy()
+    if len(rows) < 2:
+        return motion
+    t = rows[:2, 0]
+    (begin, _, _), (end, rate, _) = motion(t[0]), motion(t[1])
+    rows[0] = hermite(t, np.array([begin, end]), np.array([0.0, rate])).segments[0]
+    return Signal(rows, motion.spec)
 
 
 def smoothed(t: np.ndarray, y: np.ndarray) -> Signal:

@@ -153,7 +153,7 @@ def _starts(search: Search, found: Estimate) -> list[str]:
                 unit = "rad/s" if force_unit(search.robot, given.joint) == "N m" else "m/s"
                 out.append(
                     f"joint {given.joint} moves at once, at {rate:.3g} {unit}; a fit begins at "
-                    "rest. A run that begins in motion makes the estimates wrong"
+                    "rest. If the run began in motion, the estimates are wrong"
                 )
         first = int(np.argmax(each.counted.any(axis=0)))
         for name, y, z in zip(

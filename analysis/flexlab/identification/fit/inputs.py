@@ -20,6 +20,8 @@ from flexura.io.quantities import listed
 from flexura.signals import COLUMNS, Signal
 
 from ...comparison.replay.smoothing import (
+    from_rest,
+    hermite,
     recorded_samples,
     resolution,
     smoothed,
@@ -191,7 +193,8 @@ def rate_at_start(run: fx.Run, given: Input) -> float:
     name = f"joint/{given.joint}/velocity"
     if run.meta.get("source") == "simulation" and name in run:
         rates = run[name][np.isfinite(run[name])]
-        return float(rates[0]) if abs(rates[0]) > SLOW * np.abs(rates).max() else 0.0
+        moves = len(rates) and abs(rates[0]) > SLOW * np.abs(rates).max()
+        return float(rates[0]) if moves else 0.0
     if given.kind != MOTION:
         return 0.0
     t, y = recorded_samples(run.t, run[given.channel], given.channel)
@@ -199,27 +202,6 @@ def rate_at_start(run: fx.Run, given: Input) -> float:
     least = max(6 * noise(y), 2 * resolution(y))
     fast = abs(rates[0]) > SLOW * np.abs(rates).max() and abs(y[1] - y[0]) > least
     return float(rates[0]) if fast else 0.0
-
-
-def hermite(t: np.ndarray, y: np.ndarray, rates: np.ndarray) -> Signal:
-    """The cubic polynomials through positions with their rates (k,); the last one goes on."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    rows = np.zeros((len(t) - 1, COLUMNS))
-    rows[:, 0] = t[:-1]
-    rows[:, 1:5] = CubicHermiteSpline(t, y, rates).c[::-1].T
-    return Signal(rows, {"kind": "hermite", "t_s": t.tolist(), "y": y.tolist()})
-
-
-def from_rest(motion: Signal) -> Signal:
-    """A motion that begins at rest: its first polynomial gets the rate within its own length."""
-    rows = motion.segments.copy()
-    if len(rows) < 2:
-        return motion
-    t = rows[:2, 0]
-    (begin, _, _), (end, rate, _) = motion(t[0]), motion(t[1])
-    rows[0] = hermite(t, np.array([begin, end]), np.array([0.0, rate])).segments[0]
-    return Signal(rows, motion.spec)
 
 
 def _hold_s(run: fx.Run, given: Input, t: np.ndarray) -> float:
