@@ -122,8 +122,9 @@ class Experiment:
             made = robot.replace(self.starts(robot) | own)
             system, drive = fx.assemble(made), self._drive(made, acting)
             straight = "straight" if self.run.meta.get("start") == "straight" else None
-            run = fx.simulate(system, t, drive, rtol=RTOL, start=straight)
-            self._cache[key] = run.uninterrupted()
+            self._cache[key] = fx.simulate(
+                system, t, drive, rtol=RTOL, start=straight
+            ).uninterrupted()
         return self._cache[key]
 
     def starts(self, robot: fx.Robot) -> dict[str, float]:
