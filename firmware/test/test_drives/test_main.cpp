@@ -16,12 +16,7 @@ static void turning(float drive_2, float encoder_2 = 1) {
   config.drive_1() = 2;
   config.drive_2() = drive_2;
   config.encoder_2() = encoder_2;
-  begin(config);
-  Inputs &in = rig.inputs();
-  memset(&in, 0, sizeof in);
-  in.flex = 3500;
-  in.supply = 500;
-  tick();
+  begin_with(config);
   const Reference reference = {0, 0, 0};
   CHECK(ask(Reference::kCode, &reference) == Result::ok);
 }
@@ -116,15 +111,10 @@ static void motors_with_observers() {
   config.drive_1() = config.drive_2() = 2;
   config.kp_1_V_rad() = config.kp_2_V_rad() = 524287 / 65536.0f * 0.09375f;
   config.observer_1_Hz() = config.observer_2_Hz() = 20;
-  begin(config);
+  begin_with(config);
   const FixedPointConfig &fixed = rig.fixed();
   CHECK(fixed.gains[0].kp == 524287 && fixed.gains[1].kp == 524287);
   CHECK(fixed.observer[0].filter && fixed.observer[1].filter);
-  Inputs &in = rig.inputs();
-  memset(&in, 0, sizeof in);
-  in.flex = 3500;
-  in.supply = 500;
-  tick();
   const Reference reference = {0, 0, 0};
   CHECK(ask(Reference::kCode, &reference) == Result::ok);
 }
@@ -159,12 +149,7 @@ static void both_motors_start_from_nothing() {
   config.drive_1() = config.drive_2() = 2;
   config.kp_1_V_rad() = config.kp_2_V_rad() = 10;
   config.voltage_slew_V_s() = 201.5f;
-  begin(config);
-  Inputs &in = rig.inputs();
-  memset(&in, 0, sizeof in);
-  in.flex = 3500;
-  in.supply = 500;
-  tick();
+  begin_with(config);
   const Reference reference = {0, 0, 0};
   CHECK(ask(Reference::kCode, &reference) == Result::ok);
   CHECK(rig.fixed().gains[1].slew == 215);
@@ -220,12 +205,8 @@ static void a_stepper_without_an_encoder_is_where_its_pulses_are() {
   Config config = default_config();
   config.encoder_2() = 0;
   config.feedback_2() = 1;
-  begin(config);
+  begin_with(config);
   Inputs &in = rig.inputs();
-  memset(&in, 0, sizeof in);
-  in.flex = 3500;
-  in.supply = 500;
-  tick();
   const Reference reference = {0, 12, 12}, apart = {0, 500, 0};
   CHECK(ask(Reference::kCode, &apart) == Result::out_of_range);
   CHECK(ask(Reference::kCode, &reference) == Result::ok);

@@ -11,14 +11,6 @@ static Inputs &still() {
   return in;
 }
 
-static void begin_with(const Config &config) {
-  begin(config);
-  Inputs &in = rig.inputs();
-  in.flex = 3500;
-  in.supply = 500;
-  tick();
-}
-
 static Result reference(int32_t position_1, int32_t position_2, int32_t steps) {
   const Reference here = {position_1, position_2, steps};
   return ask(Reference::kCode, &here);

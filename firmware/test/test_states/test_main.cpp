@@ -114,13 +114,8 @@ static void every_fault_has_its_reason() {
 
 static Fault fault_of_joint_2(void (*moves)(uint16_t)) {
   run_open_loop(0, 400);
-  const Config config = default_config();  // 0.05 rad may be lost
-  begin(config);
+  begin_with(default_config());  // 0.05 rad may be lost
   Inputs &in = rig.inputs();
-  in.flex = 3500;
-  in.supply = 500;
-  in.switches = 0;
-  tick();
   const Reference reference = {0, 0, 0};
   const Arm arm = {static_cast<uint8_t>(Mode::open_loop)};
   const Start start = {6};
@@ -197,11 +192,8 @@ static void without_a_proven_stop_nothing_is_armed() {
   const uint8_t open = 1 << static_cast<uint8_t>(Flag::emergency_stop);
   const uint32_t others[] = {0, kFirmware - 1, kFirmware ^ 0x80000000UL};
   for (uint32_t proven : others) {
-    begin(default_config(), 1, proven);
+    begin_with(default_config(), proven);
     Inputs &in = rig.inputs();
-    in.flex = 3500;
-    in.supply = 500;
-    tick();
     uint16_t detail = 99;
     CHECK(ask(Reference::kCode, &reference) == Result::ok);
     CHECK(rig.command(Arm::kCode, reinterpret_cast<const uint8_t *>(&arm), detail) ==
@@ -325,11 +317,8 @@ static uint32_t outputs_of_the_control(float observer_Hz) {
   config.bo_1_V_s_m() = 15;
   config.flex_c1_m() = 0.3f;
   config.flex_c2_m() = config.flex_c3_m() = 0.1f;
-  begin(config);
+  begin_with(config);
   Inputs &in = rig.inputs();
-  in.flex = 3500;
-  in.supply = 500;
-  tick();
   const Reference reference = {0, 0, 0};
   const Arm arm = {static_cast<uint8_t>(Mode::position)};
   const Start start = {3};
