@@ -78,8 +78,7 @@ class Exponential : public Method<Real> {
     for (int k = 0; k < LANES; ++k) {
       if (lane(which, k) < 0.5 || !goes_on[k] || !excites_coupled_modes(k)) continue;
       take_modes(k, q, v, lane(t, k), false);
-      put_origin(k, q, v);
-      transform_history(k), steps.forget_tables(k);
+      go_over_to_modes(k, q, v);
       renewed = true;
     }
     if (renewed) look_at_start(t);
@@ -141,8 +140,7 @@ class Exponential : public Method<Real> {
         set_lane(weigh, k, 1.0);
       if (raise_cutoff(k)) steps.forget_tables(k);
       if (!modes.has_moved(k, c.plant, q) || !take_modes(k, q, v, lane(end, k))) continue;
-      put_origin(k, q, v);
-      transform_history(k), steps.forget_tables(k);
+      go_over_to_modes(k, q, v);
       set_lane(weigh, k, 1.0);
     }
     set_error_weights(weigh, end);
@@ -398,6 +396,13 @@ class Exponential : public Method<Real> {
         sum += lane(v[i], k) * lane(modes.rows[i * modes.stride + mode], k);
       set_lane(steps.eta[mode], k, 0.0), set_lane(steps.etad[mode], k, sum);
     }
+  }
+
+  // Robot k goes on from its state with the modes that were just taken there.
+  void go_over_to_modes(int k, const Real *q, const Real *v) {
+    put_origin(k, q, v);
+    transform_history(k);
+    steps.forget_tables(k);
   }
 
   // Robot k's last values of N, and of what it loses besides, in its new modes.
