@@ -11,7 +11,8 @@
 The intervals account for noise and add the uncertainty of fixed model parameters: one element less;
 0.5 % of the strip's mass (leads and glue of the sensor are in no file); and a payload radius of
 gyration of 5.6 mm, that of a cube of 20 g of steel. The latter lowers the second mode by 0.3 %, and
-the second mode distinguishes payload from stiffness.
+the second mode distinguishes payload from stiffness. The bearing before a gear gives way before it
+slides, the model's does not: half of that is an uncertainty of the play.
 
 Only channels, robot file and rig file are used. An emulated plant's true parameters are not read.
 """
@@ -40,6 +41,7 @@ FIRST_PART_S = 2.0
 # 5 % of stiffness are 2 % of frequency, a sixth of a period in 2 s
 STIFFNESS_GRID = np.exp(np.linspace(np.log(0.7), np.log(1.4), 15))
 MASS_UNCERTAINTY, GYRATION_UNCERTAINTY_M, NUT_COMPLIANCE_UNCERTAINTY = 0.005, 5.6e-3, 0.5
+PRESLIDING_UNCERTAINTY = 0.5  # of what a bearing gives way before it slides
 CONTACT = "contact"  # sought last: it moves the first frequency as stiffness and payload do
 CORRELATION_S = 0.4  # two periods of the first mode
 
@@ -157,13 +159,18 @@ def identify(
     if all(axis.turns for axis in nominal.axes):
         strip = _strip(data, nominal, strip.values, correlation_samples)
     report("strip", 1.0)
-    variations: tuple[tuple[dict[str, float], int], ...] = (
+    variations: list[tuple[dict[str, float], int]] = [
         ({}, -1),
         ({"mass": 1 + MASS_UNCERTAINTY}, 0),
         ({"gyration_m": GYRATION_UNCERTAINTY_M}, 0),
-    )
+    ]
     if not all(axis.turns for axis in nominal.axes):
-        variations += (({"give": 1 + NUT_COMPLIANCE_UNCERTAINTY}, 0),)
+        variations.append(({"give": 1 + NUT_COMPLIANCE_UNCERTAINTY}, 0))
+    else:
+        guides = [axis.guide for axis in nominal.axes if axis.guide.backlash]
+        give = max((guide.presliding / guide.backlash for guide in guides), default=0.0)
+        play = strip.values["backlash"] + PRESLIDING_UNCERTAINTY * give
+        variations.append(({"backlash": play}, 0))
     for more, elements in variations:
         strip = strip.with_model_uncertainty(
             data.residuals(strip.values | more, elements) - strip.residuals
