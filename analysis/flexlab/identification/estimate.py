@@ -148,8 +148,11 @@ def estimate(
                 share * step_directions[names.index(name), names.index(name)]
             )
 
+    at = _remembered(residuals)
+
+    @_remembered
     def jacobian(scaled: np.ndarray) -> np.ndarray:
-        base = residuals(scaled)
+        base = at(scaled)
         changes = np.array([residuals(scaled + step) - base for step in step_directions])
         return np.linalg.solve(step_directions, changes.reshape(len(step_directions), -1)).reshape(
             changes.shape
@@ -159,7 +162,7 @@ def estimate(
     bounds = np.array([[u.to_scaled(edge) for edge in u.bounds] for u in parameters]).T
     scale = np.array([u.step for u in parameters])
     solution = least_squares(
-        lambda x: residuals(x).ravel(),
+        lambda x: at(x).ravel(),
         start,
         lambda x: jacobian(x).reshape(len(x), -1).T,
         tuple(bounds),
@@ -169,7 +172,7 @@ def estimate(
         gtol=1e-9,
         max_nfev=max_steps,
     )
-    final_residuals = residuals(solution.x)
+    final_residuals = at(solution.x)
     J = jacobian(solution.x)  # (k, s, T)
     return Estimate(
         tuple(parameters),
@@ -179,6 +182,18 @@ def estimate(
         J,
         count,
     )
+
+
+def _remembered(function: Callable[[np.ndarray], np.ndarray]) -> Callable[..., np.ndarray]:
+    """The function, which is not computed again where its argument is the last one's."""
+    last: list[np.ndarray] = []
+
+    def call(x: np.ndarray) -> np.ndarray:
+        if not last or not np.array_equal(last[0], x):
+            last[:] = x.copy(), function(x)
+        return last[1]
+
+    return call
 
 
 def covariance(J: np.ndarray, residuals: np.ndarray, correlation_samples: int) -> np.ndarray:

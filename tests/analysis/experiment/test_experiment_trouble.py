@@ -25,7 +25,7 @@ from flexlab.recordings.run_from_recording import UNEXPLAINED, run_from_recordin
 
 LONG = ("free-vibration", "--duration-s", 20)
 SHORT = ("free-vibration", "--duration-s", 1.1)
-SLOW = pytest.mark.slow
+SLOW, HOURS = pytest.mark.slow, pytest.mark.long
 # the board's host_timeout_s is 0.2; its time may lag on a busy machine, ours does not wait for it
 OFF_S = 1.0
 
@@ -109,7 +109,9 @@ def killed(line, cwd, name, after_s):
 
 
 @pytest.mark.timeout(1200)  # 20 times some 13 s on a machine with much else to do
-@pytest.mark.parametrize("count, seed", [(2, 1), pytest.param(20, 2, marks=SLOW)])
+@pytest.mark.parametrize(
+    "count, seed", [(2, 1), pytest.param(3, 2, marks=SLOW), pytest.param(20, 3, marks=HOURS)]
+)
 def test_kill_9_at_a_random_moment(line, tmp_path, count, seed):
     moments = random.Random(seed)
     ran, saved = 0, []

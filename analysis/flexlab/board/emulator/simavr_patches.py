@@ -12,6 +12,7 @@ follows the skip. That costs 6 to 8 cycles more than on the chip.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 from flexura.errors import FlexuraError
@@ -27,16 +28,9 @@ def repair(flash: Any, begin: int, end: int) -> int:
     Raises FlexuraError where a branch leads into the middle of a pair, which no compiler is known
     to do.
     """
-    code = list(_instructions(flash, begin, end))
-    found = [at for at, word in code if _skips(word) and _mistaken(_word(flash, at + 2))]
-    targets = {_target(flash, at, word) for at, word in code}
     place = TOP
+    found = _pairs(bytes(flash[:end]), begin)
     for at in found:
-        if at + 2 in targets:
-            raise FlexuraError(
-                f"simavr executes the code at {at:#x} wrongly (a skip over ADIW or SBIW), and it "
-                f"cannot be moved"
-            )
         place -= _BYTES
         if place < end:
             raise FlexuraError("no room in the flash for the code that simavr executes wrongly")
@@ -48,6 +42,21 @@ def repair(flash: Any, begin: int, end: int) -> int:
         for k, word in enumerate(_jump(place)):
             _put(flash, at + 2 * k, word)
     return len(found)
+
+
+@lru_cache(maxsize=4)  # the same program is loaded many times
+def _pairs(flash: bytes, begin: int) -> tuple[int, ...]:
+    """The addresses of all such pairs in a flash image, from `begin` on."""
+    code = list(_instructions(flash, begin, len(flash)))
+    found = [at for at, word in code if _skips(word) and _mistaken(_word(flash, at + 2))]
+    targets = {_target(flash, at, word) for at, word in code}
+    for at in found:
+        if at + 2 in targets:
+            raise FlexuraError(
+                f"simavr executes the code at {at:#x} wrongly (a skip over ADIW or SBIW), and it "
+                f"cannot be moved"
+            )
+    return tuple(found)
 
 
 def _word(flash: Any, at: int) -> int:

@@ -87,8 +87,8 @@ def _gains(data: Tables, file: str) -> Gains:
     for key, value in table.items():
         if key not in NAMES and key not in SHARED:
             near = meant(key, fitting(table))
-            hint = f"; did you mean {near}?" if near else "; see docs/reference/gains-file.md"
-            raise InputError(f"an unknown setting{hint}", key=f"controller.{key}", value=value)
+            hint = f"did you mean {near}?" if near else "names are as kp_1_N_m_rad, rate_Hz"
+            raise InputError(f"an unknown setting; {hint}", key=f"controller.{key}", value=value)
         if not is_plausible(value):
             raise InputError(f"expected {PLAUSIBLE}", key=f"controller.{key}", value=value)
         if key.startswith("feedback_") and value not in (0, 1):
