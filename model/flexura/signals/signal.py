@@ -65,15 +65,17 @@ def evaluate(segments: np.ndarray, t: float) -> tuple[float, float, float]:
 
 
 def evaluate_many(segments: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """y and dy/dt (T,) of packed segments (60) at many times.
+    """y and dy/dt (T,) of packed segments (60) at many times; y has the digits of `evaluate`.
 
     Args:
-        segments: (k, 10), one or more.
+        segments: (k, 10).
         t: times (T,) [s].
 
     Returns:
-        The two arrays.
+        The two arrays; 0 where k = 0.
     """
+    if len(segments) == 0:
+        return np.zeros(len(t)), np.zeros(len(t))
     rows = segments[np.maximum(np.searchsorted(segments[:, 0], t, side="right") - 1, 0)]
     late = t - rows[:, 0]
     s = np.maximum(late, 0.0)
@@ -83,8 +85,9 @@ def evaluate_many(segments: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.n
         y = y * s + rows[:, k]
     A, w = rows[:, 7], rows[:, 8]
     if A.any():
-        angle = w * s + rows[:, 9]
-        y, yd = y + A * np.sin(angle), yd + A * w * np.cos(angle)
+        angles = (w * s + rows[:, 9]).tolist()  # NumPy's sines depend on the processor
+        y = y + A * np.array([math.sin(angle) for angle in angles])
+        yd = yd + A * w * np.array([math.cos(angle) for angle in angles])
     return y, np.where(late < 0, 0.0, yd)
 
 

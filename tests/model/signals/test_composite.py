@@ -65,6 +65,18 @@ PARTS = [
 ]
 
 
+@pytest.mark.parametrize(
+    "signal", [*PARTS, harmonic(0.3, 4.0, 0.2, 0.1), signals.sum([*PARTS, harmonic(0.3, 4.0)])]
+)
+def test_many_values_have_the_digits_of_each(signal):
+    breaks = signal.breaks if isinstance(signal, signals.Signal) else []
+    t = np.concatenate([np.random.default_rng(1).uniform(-0.5, 2.5, 500), breaks])
+    y, rates = signals.evaluate_many(signal.segments, t)
+    each = np.array([signals.evaluate(signal.segments, at)[:2] for at in t])
+    assert np.array_equal(y, each[:, 0])
+    np.testing.assert_allclose(rates, each[:, 1], rtol=1e-12, atol=1e-12 * abs(rates).max())
+
+
 @pytest.mark.parametrize("more", [[], [harmonic(0.3, 4.0, 0.2, 0.1)], [harmonic(0.3, 1.25)]])
 def test_a_sum_is_the_sum_of_values_and_derivatives(more):
     parts = PARTS + more
