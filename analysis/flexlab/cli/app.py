@@ -158,6 +158,8 @@ def main() -> None:
             _end_without_memory(error)
         said = f"flexura: {error.filename or 'standard output'}: {error.strerror or error}"
         typer.echo(printable(said), err=True)
+        if _interrupted.is_set():
+            _end_interrupted()
         sys.exit(2 if error.errno == errno.ENAMETOOLONG else 1)  # no such file can be there
     except Exception as error:
         if isinstance(error, MemoryError) or any(text in str(error) for text in SHORT_OF_MEMORY):
@@ -167,6 +169,8 @@ def main() -> None:
                 raise
             _end_interrupted()
         typer.echo(f"flexura: {error}", err=True)
+        if _interrupted.is_set() and not isinstance(error, InputError):
+            _end_interrupted()
         sys.exit(2 if isinstance(error, InputError) else 1)
 
 
