@@ -158,9 +158,7 @@ def main() -> None:
             _end_without_memory(error)
         said = f"flexura: {error.filename or 'standard output'}: {error.strerror or error}"
         typer.echo(printable(said), err=True)
-        if _interrupted.is_set():
-            _end_interrupted()
-        sys.exit(2 if error.errno == errno.ENAMETOOLONG else 1)  # no such file can be there
+        _end(2 if error.errno == errno.ENAMETOOLONG else 1)  # no such file can be there
     except Exception as error:
         if isinstance(error, MemoryError) or any(text in str(error) for text in SHORT_OF_MEMORY):
             _end_without_memory(error)
@@ -169,9 +167,7 @@ def main() -> None:
                 raise
             _end_interrupted()
         typer.echo(f"flexura: {error}", err=True)
-        if _interrupted.is_set() and not isinstance(error, InputError):
-            _end_interrupted()
-        sys.exit(2 if isinstance(error, InputError) else 1)
+        _end(2 if isinstance(error, InputError) else 1)
 
 
 def _refuse_empty(words: list[str]) -> None:
@@ -206,6 +202,13 @@ def _unraisable(what: Any) -> None:
         again.start()
     else:
         sys.__unraisablehook__(what)
+
+
+def _end(status: int) -> NoReturn:
+    """End with a status; what fails after an interrupt was interrupted."""
+    if status == 1 and _interrupted.is_set():
+        _end_interrupted()
+    sys.exit(status)
 
 
 def _end_interrupted() -> NoReturn:

@@ -166,9 +166,8 @@ def identify(
     ]
     if not all(axis.turns for axis in nominal.axes):
         variations.append(({"give": 1 + NUT_COMPLIANCE_UNCERTAINTY}, 0))
-    else:
-        guides = [axis.guide for axis in nominal.axes if axis.guide.backlash]
-        give = max((guide.presliding / guide.backlash for guide in guides), default=0.0)
+    elif guides := [axis.guide for axis in nominal.axes if axis.guide.backlash]:
+        give = max(guide.presliding / guide.backlash for guide in guides)
         play = strip.values["backlash"] + PRESLIDING_UNCERTAINTY * give
         variations.append(({"backlash": play}, 0))
     for more, elements in variations:
