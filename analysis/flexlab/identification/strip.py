@@ -89,7 +89,7 @@ class StripModel:
             samples = recorded_samples(self.t, experiment[name][part], name)
             self._shafts[axis] = smoothing_spline(*with_initial_rest(*samples))
         self._shaft_positions = {
-            axis: np.array([shaft(at)[0] for at in self._times])
+            axis: signals.evaluate_many(shaft.segments, self._times)[0]
             for axis, shaft in self._shafts.items()
         }
         kind = "flex" if isinstance(rig.sensor, Flex) else "strain_gauge"

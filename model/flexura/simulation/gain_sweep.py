@@ -19,7 +19,7 @@ import numpy as np
 from .. import core
 from ..control import JOINT, PID, STRIP, Controller
 from ..errors import InputError
-from ..signals import LoadsLike, Signal, as_loads, evaluate_many
+from ..signals import LoadsLike, as_loads, evaluate_many
 from ..system import System
 from .start import consistent_start
 
@@ -112,7 +112,10 @@ def prepare_gain_sweep(
     every = max(1, round(output_step_s * rate))
     t = np.arange(0, round(duration_s * rate) + 1, every) / rate
     controller = controller.within(float(t[0]), float(t[-1]))
-    references = np.array([_reference(joint, t) for joint in controller.joints])
+    references = np.zeros((len(controller.joints), len(t)))
+    for followed, joint in zip(references, controller.joints, strict=True):
+        if isinstance(joint, PID):
+            followed[:] = evaluate_many(joint.reference.segments, t)[0]
     lengths = [link.length_m for link in system.robot.links]
     on_links = as_loads(loads, lengths, float(t[0]), float(t[-1]))
     segments, ranges, gains, follows, _ = controller.core_drives()
@@ -132,12 +135,3 @@ def prepare_gain_sweep(
         on_links.packed() if on_links else None,
     )
     return GainSweep(len(controller.joints), runs)
-
-
-def _reference(joint: Any, t: np.ndarray) -> np.ndarray:
-    """What a joint is to follow (T,): 0 where it is no PID's."""
-    if not isinstance(joint, PID):
-        return np.zeros(len(t))
-    if type(joint.reference) is Signal:
-        return evaluate_many(joint.reference.segments, t)[0]
-    return np.array([joint.reference(at)[0] for at in t])
